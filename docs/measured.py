@@ -2,15 +2,18 @@
 """Numbers on pages come from docs/data alone.
 
 docs/measured.py collect FOLDER FILE COMMIT   what docs/measure.sh left, as one file: commands, machine, quartiles
-docs/measured.py fill                         writes the tables of README.md and docs/results.md
-docs/measured.py check                        fails where a page differs from what fill would write
+docs/measured.py fill [PAGE ...]              writes the numbers of these pages, or of README.md and all in docs
+docs/measured.py check [PAGE ...]             fails where a page differs from what fill would write
 
-A table stands between <!-- data: NAME --> and <!-- end -->; the functions below make them.
+A table stands between <!-- data: NAME --> and <!-- end -->; `tables` below makes it. A number in a sentence is
+<!--n:PART/WORD/.../FIELD-->9.8 ms<!--/n-->: of the one row of docs/data/PART.json that all the words match (its key, mode
+or scene, a word of its command, or FIELD=VALUE) the field, with its unit. docs/data/earlier.json has the parts that
+docs/measure.sh does not measure; what is not known about them is null.
 """
 import datetime, json, pathlib, re, statistics, sys
 
 docs = pathlib.Path(__file__).resolve().parent
-pages = [docs.parent / "README.md", docs / "results.md"]
+pages = [docs.parent / "README.md", *sorted(docs.glob("*.md"))]
 
 
 # ------------------------------------------------------------------------------------------------ from runs to a file
@@ -71,105 +74,230 @@ def collect(folder, file, commit):
 
 
 # ------------------------------------------------------------------------------------------------ from files to pages
-def data(part):
+def read(part):
     file = docs / "data" / f"{part}.json"
     return json.loads(file.read_text()) if file.exists() else None
 
 
+def data(part):
+    """A part as measure.sh left it, else as earlier.json has it; its rows say by what command and when they were measured."""
+    found = read(part) or read("earlier").get(part)
+    if found:
+        found["rows"] = [{"command": found.get("command"), "date": found.get("date"), **row} for row in found["rows"]]
+    return found
+
+
+def matches(row, word):
+    """Whether a row has a value ("substeps=20"), or is named by this word: key, mode, scene, or a word of its command."""
+    field, equal, value = word.partition("=")
+    if equal and field in row:
+        return str(row[field]) == value
+    return word in (row.get("key"), row.get("mode"), row.get("scene"), *(row["command"] or "").split())
+
+
 def pick(part, words="", **values):
     """The rows of a part whose command has all these words, in the order of the file."""
-    return [row for row in part["rows"]
-            if all(row.get(k) == v for k, v in values.items()) and all(w in row["command"].split() for w in words.split())]
+    return [row for row in part["rows"] if all(row.get(k) == v for k, v in values.items())
+            and all(word in (row["command"] or "").split() for word in words.split())]
+
+
+def number(value, digits=3):
+    if value is None:
+        return "–"
+    if not isinstance(value, float):
+        return f"{value:,}".replace(",", " ") if isinstance(value, int) else value
+    text = f"{float(f'{value:.{digits}g}'):f}"
+    return text.rstrip("0").rstrip(".").replace("-", "−")
+
+
+def percent(value, digits=3):
+    return "–" if value is None else f"{number(100.0 * value, digits)} %"
+
+
+def share(field, digits=2):
+    """A column of per cents, the sign of which stands in its head."""
+    return lambda row: "–" if row.get(field) is None else number(100.0 * row[field], digits)
+
+
+def code(field):
+    return lambda row: f"`{row[field]}`"
+
+
+def after(flag):
+    """The word behind a flag of a row's command."""
+    return lambda row: re.search(f"{flag} (\\S+)", row["command"])[1]
 
 
 def ms(row):
-    cost = row["gpu_ms"] or row["wall_ms"]
-    return f"{cost[1]:.3g}"
-
-
-def percent(value):
-    return "–" if value is None else f"{float(f'{100 * value:.2g}'):f}".rstrip("0").rstrip(".") + " %"
+    cost = next((row[key] for key in ("gpu_ms", "wall_ms", "ms") if row.get(key)), None)
+    return number(cost[1] if isinstance(cost, list) else cost)
 
 
 def table(head, rows):
-    return "\n".join("| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows])
+    line = lambda cells: f"|{'|'.join(cells)}|"
+    return "\n".join(map(line, [head, ["---"] * len(head), *rows]))
 
 
-def source(part):
-    m = part["machine"]
-    return (f"{m['gpu'].split('/')[0]}, {m['driver']}, {m['cpu']}; commit {part['commit']}, {part['date']}; medians of "
-            f"{max(row['runs'] for row in part['rows'])} runs (`docs/data`, `docs/measure.sh`).")
+def source(name, *others):
+    """On what, when and from what the numbers of a table come, as far as that is known."""
+    parts = [data(one) for one in (name, *others)]
+    part, machine = parts[0], parts[0]["machine"] or {}
+    gpu, cpu = (re.sub(r"/.*|\(R\)| Processor| \(LLVM.*", "", machine.get(key, "")) for key in ("gpu", "cpu"))
+    commits = " and ".join(dict.fromkeys(one["commit"] for one in parts if one["commit"]))
+    runs = max(row.get("runs", 0) for row in part["rows"])
+    dates = " and ".join(dict.fromkeys(row["date"] for row in part["rows"] if row["date"]))
+    facts = [gpu, cpu, f"commit {commits}" if commits else "", dates, f"medians of {runs} runs" if runs > 1 else ""]
+    facts = list(filter(None, facts)) or [f"`{part['command']}`" if part["command"] else "as published"]
+    return f"`{name}`: {', '.join(facts)}."
 
 
-def several(rows, name, what):
-    """Rows of one solver in one line: times, errors."""
-    return [name.format(", ".join(str(row[what]) for row in rows)), ", ".join(map(ms, rows)),
-            ", ".join(percent(row["motion_final"]) for row in rows),
-            ", ".join(percent(row["motion_relative"]) for row in rows)]
+def listed(name, *columns):
+    """A table with a line for each row of a part. Columns: head and what is in it, a field or a function of the row."""
+    cell = lambda row, what: what(row) if callable(what) else number(row.get(what))
+    rows = [[cell(row, what) for _, what in columns] for row in data(name)["rows"]]
+    return table([head for head, _ in columns], rows) + "\n\n" + source(name)
+
+
+def crossed(name, side, top, cell, corner=""):
+    """A table with a line for each value of one field (or function) and a column for each of another."""
+    part = data(name)
+    get = lambda row, what: what(row) if callable(what) else row[what]
+    sides, tops = (list(dict.fromkeys(get(row, what) for row in part["rows"])) for what in (side, top))
+    cells = {(get(row, side), get(row, top)): cell(row) for row in part["rows"]}
+    rows = [[str(s), *(cells.get((s, t), "") for t in tops)] for s in sides]
+    return table([corner, *map(str, tops)], rows) + "\n\n" + source(name)
+
+
+# ------------------------------------------------------------------------------------------------ the tables
+errors = [("error, %", share("motion_final")), ("relative to displacement, %", share("motion_relative"))]
 
 
 def hard_table():
-    part = data("hard")
-    rigid = pick(part, mode="rigid-body")[0]
-    rows = [["a rigid body in 5 steps (one CPU core)", f"{rigid['wall_ms'][1]:.2g}", percent(rigid["motion_final"])]]
-    for solver, name in (("hard", "5 substeps (`--solver hard`)"), ("substeps", "20 substeps (`--solver substeps`, the default)"),
-                         ("paper", "the paper's 25 iterations (`--solver paper`)")):
-        row = pick(part, f"--solver {solver}")[0]
-        rows.append([name, f"{row['gpu_ms_flight'][1]:.2g}, {row['gpu_ms_contact'][1]:.2g}", percent(row["motion_final"])])
-    return table(["", "ms per step: in flight, in contact", "error of the motion"], rows) + "\n\n" + source(part)
+    part, rows = data("hard"), []
+    for command, name in (("--modes rigid-body", "a rigid body, 5 × 1, one CPU core"),
+                          ("--solver hard", "`--solver hard`, 5 × 1"),
+                          ("--solver substeps", "`--solver substeps`, 20 × 1, the default"),
+                          ("--solver paper", "`--solver paper`, 1 × 25")):
+        row = pick(part, command)[0]
+        times = [row["gpu_ms_flight"], row["gpu_ms_contact"]] if "gpu_ms_flight" in row else [row["wall_ms"]]
+        rows.append([name, ", ".join(number(time[1], 2) for time in times), *(what(row) for _, what in errors)])
+    head = ["substeps × iterations", "ms per step: in flight, in contact", *(name for name, _ in errors)]
+    return table(head, rows) + "\n\n" + source("hard")
 
 
-def soft_rows(part, words=""):
-    names = [("node", "`node` (XPBD by Jacobi): {} substeps", "substeps"),
-             ("gauss-seidel", "`gauss-seidel` (XPBD by colours): {} substeps", "substeps"),
-             ("cpu-fast", "`cpu-fast` (XPBD): {} substeps", "substeps"),
-             ("direct", "a Newton step with sparse Cholesky factors, one core", "iterations"),
-             ("newton", "`newton`: {} iterations", "iterations"),
-             ("explicit", "`explicit`: {} substeps", "substeps")]
-    rivals = data("rivals") or {"rows": []}
-    found = lambda mode: pick(part, words, mode=mode) or pick(rivals, words, mode=mode)
-    return [several(rows, name, what) for mode, name, what in names if (rows := found(mode))]
+solvers = [("node", "", "`node` (Jacobi XPBD), {} × 1"),
+           ("gauss-seidel", "", "`gauss-seidel` (coloured XPBD), {} × 1"),
+           ("cpu-fast", "", "`cpu-fast` (XPBD, CPU), {} × 1"),
+           ("vbd", "--acceleration 0", "`vbd`, 1 × {}"),
+           ("vbd", "--acceleration 0.9", "`vbd`, acceleration 0.9, 1 × {}"),
+           ("direct", "", "Newton with sparse Cholesky, one core, 1 × {}"),
+           ("newton", "", "`newton`, 1 × {}"),
+           ("explicit", "", "`explicit`, {} × 1")]
 
 
-def beam_table():
-    part = data("beam")
-    return table(["", "ms per step", "error", "of the way"], soft_rows(part, "soft-beam")) + "\n\n" + source(part)
-
-
-def bunny_table():
-    part, parts = data("bunny"), []
-    for modulus, name in (("5e4", "50 kPa"), ("1e6", "1 MPa")):
-        rows = soft_rows(part, f"clamped-bunny --young-modulus {modulus}")
-        parts += [[f"**{name}**", "", "", ""], *rows]
-    return table(["", "ms per step", "error", "of the way"], parts) + "\n\n" + source(part)
+def solver_table(name, scenes):
+    """The settings of one solver in one line: times, errors."""
+    lines = []
+    for scene, title in scenes:
+        lines += [[f"**{title}**", "", "", ""]] if title else []
+        for mode, words, label in solvers:
+            rows = [row for part in (name, "rivals") for row in pick(data(part), f"{scene} {words}", mode=mode)]
+            of = lambda what: ", ".join(map(what, rows))
+            if rows:
+                varied = "substeps" if label.endswith("× 1") else "iterations"
+                lines.append([label.format(of(lambda row: str(row[varied]))), of(ms), *(of(what) for _, what in errors)])
+    head = ["substeps × iterations", "ms per step", *(name for name, _ in errors)]
+    return table(head, lines) + "\n\n" + source(name, "rivals")
 
 
 def copies_table():
     part = data("copies")
     one = part["rows"][0]["fps"][1]
-    rows = [[str(row["copies"]), f"{row['gpu_ms'][1]:.3g}", f"{row['copies'] * row['fps'][1]:,.0f}".replace(",", " "),
-             f"{row['copies'] * row['fps'][1] / one:.3g}"] for row in part["rows"]]
-    return table([f"copies of {part['rows'][0]['tets']} tets", "ms per step", "steps of one per second", "times one alone"], rows) + "\n\n" + source(part)
+    rows = [[str(row["copies"]), ms(row), number(round(row["copies"] * row["fps"][1])),
+             number(row["copies"] * row["fps"][1] / one)] for row in part["rows"]]
+    head = [f"copies of {part['rows'][0]['tets']} tets", "ms per step", "steps of one per second", "times one alone"]
+    return table(head, rows) + "\n\n" + source("copies")
 
 
-tables = {"hard": hard_table, "beam": beam_table, "bunny": bunny_table, "copies": copies_table}
+def losses_table():
+    each = lambda field: lambda row: ", ".join(number(100.0 * value) for value in row[field])
+    return listed("losses", ("largest net volume loss, %", "body"), ("published", each("published")), ("tetpbd", each("loss")))
+
+
+def arrow(row):
+    """Time -> error in per cent, bold where a row is what its scene has."""
+    error = next((row[key] for key in ("total", "total_relative", "motion_final") if row.get(key) is not None), None)
+    text = f"{ms(row)} → {'–' if error is None else number(100.0 * error)}"
+    return f"**{text}**" if row.get("default") else text
+
+
+tables = {
+    "hard": hard_table,
+    "beam": lambda: solver_table("beam", [("soft-beam", "")]),
+    "bunny": lambda: solver_table("bunny", [("clamped-bunny --young-modulus 5e4", "50 kPa"),
+                                            ("clamped-bunny --young-modulus 1e6", "1 MPa")]),
+    "copies": copies_table,
+    "forces": lambda: crossed("forces", "name", "setting",
+                              lambda r: arrow(r) + (f" ({r['substeps']})" if r["mode"] == "explicit" else "")),
+    "meshes": lambda: crossed("meshes", lambda r: f"{r['mesh']}, {number(r['like'])} tets",
+                              lambda r: f"`{r['scene']}`" + ", smoothed" * (r["element"] == "smoothed"), arrow),
+    "sag-motion": lambda: crossed("sag-motion", "name", "element", arrow),
+    "stiffness": lambda: crossed("stiffness", after("--dt"), after("--young-modulus"),
+                                 lambda r: ", ".join(what(r) for _, what in errors), "dt, s; *E*, Pa"),
+    "contact": lambda: listed("contact", ("scene", code("scene")), ("mode", code("mode")), ("least distance", "least"),
+                              ("momentum, m/s", "momentum"),
+                              ("ms per step, 95 %", lambda r: f"{ms(r)}, {number(r['ms_95'])}")),
+    "created": lambda: listed("created", ("scene", lambda r: r.get("name", f"`{r['scene']}`")), ("mode", code("mode")),
+                              ("energy created, %", share("created")), ("ms per step", ms)),
+    "others": lambda: listed("others", ("program", "program"), ("scene", "what"), ("promises", "promise"),
+                             ("ms per step", ms)),
+    "sag": lambda: crossed("sag", "nu", "cells", share("ratio", 3), "%"),
+    "sag-smoothed": lambda: crossed("sag-smoothed", "element", "nu", share("ratio", 4), "%"),
+    "pipeline": lambda: crossed("pipeline", "name", "body", lambda r: f"{number(r['us'])}; {number(100 * r['loss'])}",
+                                "µs; loss, %"),
+    "materials": lambda: crossed("materials", "name", code("mode"), ms, "ms per step"),
+    "hard-cases": lambda: listed("hard-cases", ("mode", "name"), ("recovered", lambda r: f"{r['recovered']} of {r['of']}")),
+    "losses": losses_table,
+}
+
+
+# ------------------------------------------------------------------------------------------------ numbers in sentences
+units = {"speed": " m/s", "distance": " mm", "us": " µs"}
+aliases = {"error": "motion_final", "relative": "motion_relative"}
+fractions = {"motion_final", "motion_relative", "total", "created", "loss", "off", "shape", "ratio", "energy", "cost"}
+
+
+def quoted(key):
+    """PART/WORD/.../FIELD: of the one row that all these words match what it has there, with its unit."""
+    name, *words, field = key.split("/")
+    part = data(name) or sys.exit(f"{key}: docs/data has no part {name}")
+    rows = [row for row in part["rows"] if all(matches(row, word) for word in words)]
+    field = aliases.get(field, field)
+    if len(rows) != 1:
+        sys.exit(f"{key}: {len(rows)} rows match")
+    if field == "ms":
+        return f"{ms(rows[0])} ms"
+    value = rows[0][field] if field in rows[0] else sys.exit(f"{key}: the row has {', '.join(rows[0])}")
+    return percent(value) if field in fractions else number(value) + units.get(field, "")
 
 
 def filled(text):
     def block(found):
         name = found[1]
-        return f"<!-- data: {name} -->\n{tables[name]()}\n<!-- end -->" if data(name) else found[0]
-    return re.sub(r"<!-- data: (\w+) -->\n.*?<!-- end -->", block, text, flags=re.S)
+        made = tables[name]() if name in tables else sys.exit(f"{name}: not among the tables of docs/measured.py")
+        return f"<!-- data: {name} -->\n{made}\n<!-- end -->"
+    text = re.sub(r"<!-- data: (\w[\w-]*) -->\n.*?<!-- end -->", block, text, flags=re.S)
+    return re.sub(r"(<!-- ?n: ?([\w-]+/\S+?) ?-->).*?(<!-- ?/n ?-->)", lambda m: m[1] + quoted(m[2]) + m[3], text, flags=re.S)
 
 
 def main(words):
     if words[:1] == ["collect"] and len(words) == 4:
         return collect(pathlib.Path(words[1]), pathlib.Path(words[2]), words[3])
-    if words not in (["fill"], ["check"]):
+    if words[:1] not in (["fill"], ["check"]):
         sys.exit(__doc__)
-    for page in pages:
+    for page in map(pathlib.Path, words[1:]) if words[1:] else pages:
         text = page.read_text()
-        if words == ["fill"]:
+        if words[0] == "fill":
             page.write_text(filled(text))
         elif filled(text) != text:
             sys.exit(f"{page}: differs from docs/data: run docs/measured.py fill")

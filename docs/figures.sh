@@ -92,7 +92,7 @@ stiffness() {
     words+=(-annotate "$(printf 0x0%+d+60 $((168 * (k - 2))))" "$text")
     k=$((k + 1))
   done
-  jpeg "$out/stiffness.png" $(label 20) "${words[@]}" "$into/stiffness.jpg"
+  jpeg "$out/stiffness.png" $(label 20) "${words[@]}" -crop 900x240+150+40 +repage "$into/stiffness.jpg"
 }
 
 [[ $# -gt 0 ]] || set -- tets scenes lanes hero stiffness

@@ -29,18 +29,7 @@ run_commands() {  # FOLDER
   ln -sf "$program" bin/tetpbd
   export PATH=$PWD/bin:$PATH TETPBD_CACHE=$PWD/cache
   awk '/^<!-- file: / { name = $3; next } /^```/ { if (name && inside) name = ""; inside = !inside; next } inside && name { print >name }' "$page"
-  # The reader's own mesh: a ring of quadrilaterals.
-  awk 'BEGIN {
-    turn = 6.283185307
-    for (i = 0; i < 24; ++i) for (j = 0; j < 10; ++j) {
-      r = 3 + cos(turn * j / 10)
-      print "v", r * cos(turn * i / 24), r * sin(turn * i / 24), sin(turn * j / 10)
-    }
-    for (i = 0; i < 24; ++i) for (j = 0; j < 10; ++j) {
-      k = (i + 1) % 24; l = (j + 1) % 10
-      print "f", 10 * i + j + 1, 10 * k + j + 1, 10 * k + l + 1, 10 * i + l + 1
-    }
-  }' >my.obj
+  "$docs/../tests/ring_mesh.sh" >my.obj
   local line
   while IFS= read -r line <&3; do
     [[ $line == "tetpbd view"* ]] && continue  # of the window

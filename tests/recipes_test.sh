@@ -2,23 +2,12 @@
 # The commands of docs/guide.md, "Recipes", as they stand there.
 # Usage: recipes_test.sh PROGRAM GUIDE FOLDER
 set -euo pipefail
-program=$(realpath "$1") guide=$(realpath "$2")
+program=$(realpath "$1") guide=$(realpath "$2") here=$(dirname "$(realpath "$0")")
 rm -rf "$3" && mkdir -p "$3/bin" && cd "$3"
 ln -s "$program" bin/tetpbd
 export PATH=$PWD/bin:$PATH
 
-# The reader's own mesh: a ring of quadrilaterals.
-awk 'BEGIN {
-  turn = 6.283185307
-  for (i = 0; i < 24; ++i) for (j = 0; j < 10; ++j) {
-    r = 3 + cos(turn * j / 10)
-    print "v", r * cos(turn * i / 24), r * sin(turn * i / 24), sin(turn * j / 10)
-  }
-  for (i = 0; i < 24; ++i) for (j = 0; j < 10; ++j) {
-    k = (i + 1) % 24; l = (j + 1) % 10
-    print "f", 10 * i + j + 1, 10 * k + j + 1, 10 * k + l + 1, 10 * i + l + 1
-  }
-}' >my.obj
+"$here/ring_mesh.sh" >my.obj
 
 # A task of a Slurm array, without Slurm.
 srun() { "$@"; }

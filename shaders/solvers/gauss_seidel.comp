@@ -7,6 +7,7 @@ layout(local_size_x = GROUP_SIZE) in;
 #define WITHOUT_CHECK
 #include "vertex_state.glsl"
 #include "solvers/multipliers.glsl"
+#include "solvers/guards.glsl"
 #include "solvers/records.glsl"
 uniform uint first_cluster, end_cluster;  // of the colour
 uint first_vertex;  // of the cluster, among those of all

@@ -2,6 +2,7 @@
 // constraint an invocation, and adds up the corrections of the vertices that the patch owns in shared memory. Sums are
 // integers, so that neither their order nor the way constraints are cut into patches changes a bit.
 
+#include "solvers/guards.glsl"
 #include "solvers/records.glsl"
 #if COMPLIANT
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
@@ -59,11 +60,7 @@ void add_ring_forces(uint first, uint owned) {
       RingNeighbour n = ring_neighbour(k);
       force += own * n.own - MATRIX_OF(averages, n.vertex) * n.other;
     }
-    vec3 correction = force * (inverse_mass_of(local_positions[local]) * params.h * params.h);
-    float most = FINE(params.max_correction), l = length(correction);
-    bool number = l * 0.0 == 0.0;
-    count_guards(!number ? GUARD_NOT_FINITE : l > most ? GUARD_LIMIT : 0u);
-    if (number) add_correction(local, owned, l > most ? correction * (most / l) : correction);
+    add_correction(local, owned, limited(force * (inverse_mass_of(local_positions[local]) * params.h * params.h)));
   }
 }
 #endif

@@ -18,12 +18,3 @@ Chunk chunk_at(uint number) {
   uvec2 counts = patch_words[CHUNK_PAIRS * number], links = patch_words[CHUNK_PAIRS * number + 1];
   return Chunk(number, counts.x, counts.y, links.x, links.y);
 }
-#if COUNT_GUARDS
-layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
-#endif
-void count_guards(uint guards) {
-#if COUNT_GUARDS
-  for (int g = 0; g < GUARDS; ++g)
-    if ((guards & (1u << g)) != 0u) atomicCounterIncrement(guard_counts[g]);
-#endif
-}

@@ -20,7 +20,6 @@ constexpr std::size_t group = 128, lanes = 8;  // invocations of a work-group, a
 struct Descent {
   Pass ends, sweep;
   std::vector<std::size_t> first;  // member of each colour, and the end
-  bool accelerated = false;
 };
 
 // The block Mesh of sweep.comp.
@@ -115,7 +114,7 @@ void run_substep(Sim& sim, Descent& d) {
   double chebyshev = 1;  // method.md eq. 43
   for (int sweep = 1; sweep <= sim.plan.iterations; ++sweep) {
     sweep_once(sim, d, sweep == sim.plan.iterations);
-    if (!d.accelerated) continue;
+    if (radius == 0) continue;
     const Program& ends = sim.recorder.use(d.ends.program);
     ends.set("sweep", unsigned(sweep)), ends.set("chebyshev", float(chebyshev));
     run_kernel(sim, d.ends, PHASE_SOLVE, ", accelerate");
@@ -135,14 +134,13 @@ Solver create_vbd_solver(const SolverInput& input) {
   const VertexColours colours = colour_vertices(input.system, vertices);
   DescentMesh mesh = make_mesh(input.system, colours);
   const auto descent = std::make_shared<Descent>();
-  if (input.settings.acceleration > 0) {
-    descent->accelerated = true;
+  const bool accelerated = input.settings.acceleration > 0;
+  if (accelerated)
     add_buffer(solver, input.tuning, "Sweeps", Buffer("last sweeps", std::vector<glm::vec4>(2 * vertices)));
-  }
   std::vector<std::string> defines = vertex_defines(input);
   defines.insert(defines.end(),
                  {define("GROUP_SIZE", group), fmt::format("LANES {}u", lanes), fmt::format("VERTICES {}u", vertices),
-                  fmt::format("USES {}u", mesh.uses), define("ACCELERATED", descent->accelerated),
+                  fmt::format("USES {}u", mesh.uses), define("ACCELERATED", accelerated),
                   define("COUNT_GUARDS", input.tuning.count_guards)});
   for (std::size_t k = 0; k < kind_count; ++k)
     if (input.system.present[k])

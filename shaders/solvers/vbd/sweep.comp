@@ -32,24 +32,7 @@ uint id_of(Ids ids, int j) { return ids[j]; }
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "solvers/newton/rest.glsl"
 #foreach #include "solvers/vbd/corner.glsl"
-
-#if COUNT_GUARDS
-layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
-void count_guard(uint guard) { atomicCounterIncrement(guard_counts[findLSB(guard)]); }
-#else
-void count_guard(uint guard) {}
-#endif
-// A correction that is no number is dropped, and one that is longer than the body is shortened.
-vec3 limited(vec3 correction) {
-  float most = FINE(params.max_correction), l = length(correction);
-  if (!(l * 0.0 == 0.0)) {
-    count_guard(GUARD_NOT_FINITE);
-    return vec3(0.0);
-  }
-  if (l <= most) return correction;
-  count_guard(GUARD_LIMIT);
-  return correction * (most / l);
-}
+#include "solvers/guards.glsl"
 
 void descend(uint i, Position own, mat3 block, vec3 gradient) {
   DoubleSingle x = DoubleSingle(own.high, own.low);

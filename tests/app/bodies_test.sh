@@ -21,7 +21,7 @@ forget; xdotool mousemove $((vx + vw * 68 / 100)) $((vy + vh / 2)); await '^prob
 key b; await '^body right$'; pause_for_frame; shot right.png
 forget; xdotool mousemove $((vx + vw * 32 / 100)) $((vy + vh / 2)); sleep 1
 key b; await '^body left$'; pause_for_frame; shot left.png
-click "section Bodies"; await '^opened Bodies'; pause_for_frame
+unfold "Bodies"
 click "seen 0"; await '^hidden left$'; pause_for_frame; shot hidden.png
 click "body 1"; await '^body right$'; pause_for_frame
 forget; xdotool mousemove $((vx + vw * 50 / 100)) $((vy + vh * 5 / 100)); sleep 1
@@ -29,7 +29,7 @@ key u; await '^shown left$'
 forget; xdotool mousemove $((vx + vw * 68 / 100)) $((vy + vh / 2)); await '^probe '
 key u; await '^hidden right$'; sleep 1
 key u; await '^shown right$'
-click "section Bodies"; await '^folded Bodies'; pause_for_frame
+fold "Bodies"
 choose body "1 right"; pause_for_frame
 forget; to young_modulus 0.5 0.5; press 1; release 1; await '^set body 1 .*"young_modulus":'
 [[ $(new_events | grep -c '^set young_modulus') -eq 0 ]] || fail "the material of all was changed"

@@ -103,7 +103,7 @@ key v; end_task '^video video_000.mp4'
 ffprobe -v error -show_entries stream=nb_frames -of csv=p=0 video_000.mp4 | grep -qE '^[1-9][0-9]+' || fail "the video has no frames"
 
 begin_task "fill a stability map, and take a cell's values"
-click "section Stability map"; await '^opened Stability map'; pause_for_frame
+unfold "Stability map"
 click "map across"; pause_for_frame
 xdotool key ctrl+a; xdotool type --delay 40 'substeps=2,6'; pause_for_frame
 click "map up"; pause_for_frame
@@ -111,7 +111,7 @@ xdotool key ctrl+a; xdotool type --delay 40 'dt=0.005,0.02'; pause_for_frame
 click "fill map"; await '^map of 4 cells'; pause_for_frame
 forget; await '^map done'
 click "map 2 1"; end_task '^map chose 6 0.005'
-click "section Stability map"; await '^folded Stability map'
+fold "Stability map"
 
 begin_task "let it choose a solver, and think better of that"
 choose solver auto; await '^at cancel '; pause_for_frame
@@ -120,7 +120,7 @@ end_task '^message cancelled: the solver stays as it is'
 new_events | grep -q '^set ' && fail "a search that was cancelled changed settings"
 
 begin_task "put an obstacle beside it and lead it by an arrow"
-click "section Obstacles"; await '^opened Obstacles'; pause_for_frame
+unfold "Obstacles"
 forget; xdotool mousemove $(point "section Obstacles" 0.5 0.5); for _ in 1 2 3 4 5 6 7 8; do xdotool click 5; pause_for_frame; done
 choose "add obstacle" sphere; await '^obstacles 1'; sleep 0.5
 read -r gx gy _ _ < <(place "gizmo y")
@@ -140,7 +140,7 @@ for _ in 1 2 3; do xdotool click 5; pause_for_frame; done  # the whole of it
 click scene=mixed; end_task '^scene mixed '
 
 begin_task "hide what stands in front"
-click "section Bodies"; await '^opened Bodies'; pause_for_frame
+unfold "Bodies"
 click "seen 0"; end_task '^hidden '
 
 begin_task "open a mesh of one's own by walking to it"

@@ -19,7 +19,7 @@ frames=$(new_events | awk '/^running/ {n[$2] += $4 / 2} END {for (k in n) if (n[
 step=$(new_events | awk '/^running/ {s = $2} END {print s}')
 drag 3 $cx $cy 60 0; release 3; await '^camera'
 # Twenty times a number and Enter at once, without a pause for the frames.
-click "section Solver more" 0.1; await '^opened Solver more'; await '^at omega '; sleep 1
+unfold "Solver more"; await '^at omega '; sleep 1
 forget
 for k in $(seq 20); do
   xdotool keydown ctrl mousemove $(point omega 0.5 0.5) mousedown 1 mouseup 1 keyup ctrl

@@ -56,6 +56,18 @@ click() {  # NAME part-of-width
   forget
   xdotool mousemove $(point "$1" "${2:-0.5}" 0.5) mousedown 1 mouseup 1
 }
+# Where widgets are has to be said anew after the panel's lines move: until no place has changed for a few frames.
+settled() {
+  local now last=
+  for _ in $(seq 40); do
+    now=$(grep -c '^at ' "$log")
+    [[ $now == "$last" ]] && return
+    last=$now
+    sleep 0.5
+  done
+}
+unfold() { click "section $1" 0.1; await "^opened $1"; settled; }
+fold() { click "section $1" 0.1; await "^folded $1"; settled; }
 # A button beside a message moves when older ones go by themselves: until a click has met it.
 click_until() {  # NAME PATTERN
   for _ in $(seq 20); do

@@ -42,7 +42,7 @@ grep -q "\"state_hash\": \"$hash\"" headless/stats.json || fail "after $steps st
 [[ $steps -gt 3 ]] || fail "only $steps steps were compared"
 
 # ------------------------------------------------------------------------------------------------------------ settings
-click "section Solver more" 0.1; await '^opened Solver more'; await '^at omega '
+unfold "Solver more"; await '^at omega '
 to omega 0.3 0.5; press 1
 xdotool mousemove $(point omega 0.5 0.5); pause_for_frame
 xdotool mousemove $(point omega 0.75 0.5); pause_for_frame
@@ -80,7 +80,7 @@ to omega 0.5 0.5; sleep 0.3; shot unusual.png
 forget; press 3; release 3; await '^back omega 1.5'; await '^set omega 1.5$'
 click undo; await '^set omega 1.2$'
 click redo; await '^set omega 1.5$'
-click "section Solver more" 0.1; await '^folded Solver more'
+fold "Solver more"
 choose mode cpu; await '^set mode cpu'
 key s; await '^step'
 choose mode node; await '^set mode node'
@@ -93,8 +93,8 @@ shot panels.png
 
 # ---------------------------------------------------------------------------------------------------------------- view
 # Out of the way, which stays so.
-click "section Solver" 0.1; await '^folded Solver'; sleep 0.5
-click "section Material" 0.1; await '^folded Material'; sleep 0.5
+fold "Solver"
+fold "Material"
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
 for colour in volume stretch velocity motion; do key c; await "^colour $colour"; done
 shot plain.png; key w; await '^worst true'
@@ -118,7 +118,7 @@ key g; await '^grid false'
 key g; await '^grid true'
 key l; await '^follow false'
 key l; await '^follow true'
-click "section View more" 0.1; await '^opened View more'; sleep 0.5
+unfold "View more"
 click grid 0.1; await '^grid false'
 click grid 0.1; await '^grid true'
 click "sky and ground" 0.1; await '^sky and ground false'
@@ -127,14 +127,14 @@ shot view.png
 choose theme dark; await '^scale 1 dark'
 await_other view.png dark.png 100000 "the dark theme"
 choose theme light; await '^scale 1 light'
-click "section Scene" 0.1; await '^folded Scene'; sleep 0.5
+fold "Scene"
 choose "text size" "125 %"; await '^scale 1.25 light'; sleep 0.5; shot larger.png
 to "text size" 0.5 0.5; forget; press 3; release 3; await '^back text size 100 %'; await '^scale 1 light'; sleep 0.5
-click "section Scene" 0.1; await '^opened Scene'; sleep 0.5
+unfold "Scene"
 drag 1 $((vx + vw)) $cy -60 0; release 1; await '^at edge '
 read -r _ _ now _ < <(place view); [[ $now -eq $((vw - 60)) ]] || fail "the panel is not wider by what its edge was dragged"
 drag 1 $((vx + vw - 60)) $cy 60 0; release 1; await "^at view 0 0 $vw "
-click "section View more" 0.1; await '^folded View more'
+fold "View more"
 key h; await '^help true'
 await_other panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame
@@ -171,7 +171,7 @@ sleep 0.5
 forget; xdotool keydown ctrl; press 1; release 1; xdotool keyup ctrl; await "^unpin $pinned\$"
 
 # ----------------------------------------------------------------------------------------------------------- obstacles
-click "section Obstacles" 0.1; await '^opened Obstacles'; sleep 0.5; shot before.png
+unfold "Obstacles"; shot before.png
 choose "add obstacle" sphere; await '^obstacles 1'; await '^obstacle 1 chosen'
 await_other before.png obstacle.png 1000 "an obstacle"
 drag 1 $(point "chosen obstacle" 0.5 0.5) 40 0; release 1; await '^obstacle 1 at '; pause_for_frame
@@ -183,7 +183,7 @@ key ctrl+z; await '^undo'; key ctrl+z; await '^obstacles 0'
 key ctrl+y; await '^obstacles 1'
 click "obstacle 1" 0.1; await '^obstacle 1 chosen'; key Delete; await '^obstacles 0'
 key r; await '^reset'
-click "section Obstacles" 0.1; await '^folded Obstacles'; sleep 0.5
+fold "Obstacles"
 
 # ---------------------------------------------------------------------------------------------- screenshots, panels
 key p; await '^screenshot screenshot_000.png'
@@ -197,7 +197,7 @@ forget; xdotool windowsize "$window" 900 600; await '^size 900 600'; await '^at 
 forget; xdotool windowsize "$window" 1000 760; await '^size 1000 760'; await '^at mesh '; pause_for_frame
 
 # -------------------------------------------------------------------------------------------------------- side by side
-click "section Side by side" 0.1; await '^opened Side by side'; sleep 0.5
+unfold "Side by side"
 forget; choose "side by side" "paper, node, cpu"
 for lane in "node, 25 iterations" "node, 5 substeps" "cpu-fast, 5 substeps"; do await "^lane $lane\$"; done
 key s; await '^step 1$'; key s; await '^step 2$'; key s; await '^step 3$'
@@ -229,15 +229,15 @@ forget; key j; await '^reset'; key k; await '^reset'
 choose "side by side" single; await '^reset'
 
 # --------------------------------------------------------------------------------------------------- stability map
-click "section Stability map" 0.1; sleep 0.5
+unfold "Stability map"
 click "map across"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "substeps=1,4"; pause_for_frame
 click "map up"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "omega=1,1.5"; pause_for_frame
 click "fill map"; await '^map of 4 cells'; await '^map done'; sleep 0.5; shot map.png
 click "map 2 1"; await '^map chose 4 1'; await '^set substeps 4'
-click "section Stability map" 0.1; sleep 0.5
+fold "Stability map"
 
 # ------------------------------------------------------------------------------------------------- errors, other scenes
-click "section Side by side" 0.1; sleep 0.5
+fold "Side by side"
 type_mesh() {
   click mesh; pause_for_frame
   xdotool keydown ctrl keydown a; pause_for_frame; xdotool keyup a keyup ctrl; pause_for_frame

@@ -1,13 +1,12 @@
 #!/usr/bin/env bash
 # docs/extending.md as it stands: its blocks are applied to a copy of the sources, counted, built and run. A row changes
-# the layout of what nearly all files include, so the short suite builds the library and the page's tests alone;
-# the long suite (TETPBD_LONG) builds the program as well and runs it.
+# the layout of what nearly all files include, so nearly all of it is built: minutes.
 #   extending_test.sh SOURCES FOLDER [PAGE]
 # A comment on a line of its own says what the code block after it is:
 #   <!-- file: PATH -->             this new file
 #   <!-- row: PATH after: TEXT -->  goes behind the first line of PATH that holds TEXT
 # and these stand alone:
-#   <!-- run: COMMAND -->           run when all is built, in an empty folder; tetpbd_tests is found, and in the long suite tetpbd
+#   <!-- run: COMMAND -->           run when all is built, in an empty folder; tetpbd and tetpbd_tests are found
 #   <!-- touches: F R T -->         the section's new files, rows, and tests (files or rows in tests/); else 1 1 1
 set -euo pipefail
 sources=$(realpath "$1") page=${3:-$1/docs/extending.md}
@@ -73,11 +72,10 @@ done
 launcher=$(command -v ccache || true)
 cmake -G Ninja -S copy -B build -DTETPBD_WERROR=ON -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DTETPBD_OPENVDB_INCLUDE= \
   ${launcher:+-DCMAKE_CXX_COMPILER_LAUNCHER="$launcher"} >configure.log || { cat configure.log; fail "configuring"; }
-cmake --build build --target tetpbd_tests ${TETPBD_LONG:+tetpbd} >build.log 2>&1 || { cat build.log; fail "building"; }
+cmake --build build --target tetpbd_tests tetpbd >build.log 2>&1 || { cat build.log; fail "building"; }
 export TETPBD_MODELS=$sources/models PATH=$PWD/build:$PWD/build/tests:$PATH
 cd run
 while IFS= read -r command; do
-  [[ -z ${TETPBD_LONG:-} && $command == 'tetpbd '* ]] && continue
   echo "\$ $command"
   bash -euo pipefail -c "$command" </dev/null || fail "$command"
 done <../commands.txt

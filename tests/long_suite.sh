@@ -14,11 +14,11 @@ run_long_suite() {  # [SEED] [ARGUMENTS of ctest]
   export TETPBD_LONG=$PWD/$folder/worst.txt TETPBD_SEED=$seed
 
   numbers() { sed -nE "s/$1/\1/p" | sort -u; }
-  all=$(ctest --preset ci -N "$@" | numbers '^ *Test +#([0-9]+): .*')
+  all=$(ctest --preset long -N "$@" | numbers '^ *Test +#([0-9]+): .*')
   passed() { numbers '.* Test +#([0-9]+): .* Passed .*' <"$folder/log.txt"; }
   left=$(comm -23 <(echo "$all") <(passed) | paste -sd,)
   # A list that starts at a number above all others holds those that are named behind it alone.
-  [[ -z $left ]] || ctest --preset ci -j"$(nproc)" -I "1000000,1000000,1,$left" | tee -a "$folder/log.txt" || true
+  [[ -z $left ]] || ctest --preset long -j"$(nproc)" -I "1000000,1000000,1,$left" | tee -a "$folder/log.txt" || true
   left=$(comm -23 <(echo "$all") <(passed) | wc -l)
   [[ $left -eq 0 ]] || { echo "long suite: $left of $(wc -w <<<"$all") tests have not passed; ./test.sh --long again runs these alone" >&2; return 1; }
   [[ $# -eq 0 ]] || return 0  # a part of it is not the long suite

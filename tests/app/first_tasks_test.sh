@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # What somebody does who has never seen the program, in twenty tasks, by clicks, drags and keys alone. Each leaves a
 # picture, and a line of tasks.tsv: number, task, seconds, what the window said.
-# Usage: first_tasks_test.sh PROGRAM FOLDER     skipped, status 77, but in the long suite (TETPBD_LONG)
+# Usage: first_tasks_test.sh PROGRAM FOLDER
 set -uo pipefail
-[[ -n ${TETPBD_LONG:-} ]] || { echo "in the long suite alone: set TETPBD_LONG"; exit 77; }
 here=$(dirname "$(realpath "$0")") models=$(realpath "$here/../../models")
 source "$here/window_driver.sh"
 begin_inside "$@"

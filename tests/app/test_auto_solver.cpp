@@ -153,7 +153,7 @@ TEST_CASE("auto: says how far it is, and can be cancelled at any time, which cha
   }
 }
 
-TEST_CASE("auto: a lane with a budget takes what fits it") {
+TEST_CASE("auto: a lane with a budget takes what fits it (long)") {
   GlTest gl;
   Settings paper;
   paper.iterations = 400, paper.substeps = 1;

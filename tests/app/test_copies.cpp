@@ -49,7 +49,7 @@ TEST_CASE("copies: each moves as the scene alone does") {
   }
 }
 
-TEST_CASE("copies: attachments, forces and materials are of each copy") {
+TEST_CASE("copies: attachments, forces and materials are of each copy (long)") {
   GlTest gl;
   const SceneOverrides none{.parameters = {{"contact", "none"}}};
   SceneOverrides three = none;

@@ -36,7 +36,7 @@ std::string smaller_scenes(const Folder& folder, const char* mesh) {
 
 }  // namespace
 
-TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does not pass") {
+TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does not pass (long)") {
   const Folder folder;
   std::ofstream(folder.path / "rest.json")
       << R"({"name": "rest", "bodies": [{"name": "block", "block": {"size": [1, 0.5, 0.5], "cells": [4, 2, 2]},
@@ -152,7 +152,7 @@ TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver
   CHECK(wrong.err.find("no baseline for this scene: rigid-body") != std::string::npos);
 }
 
-TEST_CASE("compare judges meshes and solvers together, by the motion on finer meshes") {
+TEST_CASE("compare judges meshes and solvers together, by the motion on finer meshes (long)") {
   const Folder folder;
   std::ofstream(folder.path / "cube.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
                                              "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\n"

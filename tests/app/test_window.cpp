@@ -123,8 +123,7 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   CHECK(lane_settings(own, "budget_ms=2", "--lane") == own);  // nothing to try it on
   for (const char* none : {"budget_ms=", "budget_ms=-1", "budget_ms=2ms", "budget_ms=inf"})
     CHECK_THROWS_WITH_AS(lane_settings(own, none, "--lane"), doctest::Contains("is no time"), Error);
-  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no solver"),
-                       Error);
+  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no solver"), Error);
   CHECK_THROWS_WITH_AS(lane_settings(own, "mode=newton", "--lane"), doctest::Contains("needs forces"), Error);
   for (const Comparison& row : comparisons()) {
     CAPTURE(row.name);
@@ -257,7 +256,7 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK(gl_error_count() == 0);
 }
 
-TEST_CASE("window: a history is all of it in even steps, and the newest, plots are copied and saved") {
+TEST_CASE("window: a history is all of it in even steps, and the newest, plots are copied and saved (long)") {
   History history;
   for (int i = 0; i < 30000; ++i) {
     history.add(i, 0.5 * i);

@@ -172,7 +172,7 @@ TEST_CASE_FIXTURE(GlTest,
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "contact: hard bodies come to rest and stay, to the last bit") {
+TEST_CASE_FIXTURE(GlTest, "contact: hard bodies come to rest and stay, to the last bit (long)") {
   const auto model = std::make_shared<Model>();
   add(*model, make_block({1, 0.6, 0.3}, {3, 2, 2}), {0, 0.6, 0}, tilted(), {0.5, 0, 0}, {1, 2, 3});
   for (const char* mode : {"node", "cpu-double"}) {
@@ -261,7 +261,7 @@ TEST_CASE_FIXTURE(GlTest, "contact: a deformed hard body finds its shape in flig
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "contact: bodies do not know of each other's contacts") {
+TEST_CASE_FIXTURE(GlTest, "contact: bodies do not know of each other's contacts (long)") {
   const glm::dvec3 places[] = {{0, 0.5, 0}, {3, 0.45, 0}, {6, 5, 0}};
   const auto all = std::make_shared<Model>();
   for (const glm::dvec3& place : places) add(*all, irregular_block(), place, tilted());
@@ -355,7 +355,8 @@ TEST_CASE("contact: restitution is of hard bodies") {
   refused([](Settings& s) { s.constraints = "volume"; });
 }
 
-TEST_CASE_FIXTURE(GlTest, "contact: what is left out of a hard body's contacts is counted, and nothing else is") {
+TEST_CASE_FIXTURE(GlTest,
+                  "contact: what is left out of a hard body's contacts is counted, and nothing else is (long)") {
   const auto model = std::make_shared<Model>();
   add(*model, irregular_block(), {0, 0.35, 0});
   // A cage of walls that close in on it from all sides, each dragging another way.

@@ -117,7 +117,7 @@ TEST_CASE("faces: those that are looked at are of sheets beside edges, and as wi
   CHECK(with(block_on_post(), box({}, glm::dvec3(3))) == 0);
 }
 
-TEST_CASE_FIXTURE(GlTest, "faces: a cloth lies over the edges of a box, not in it") {
+TEST_CASE_FIXTURE(GlTest, "faces: a cloth lies over the edges of a box, not in it (long)") {
   for (const char* mode : {"node", "newton", "cpu-double", "cpu-fast"}) {
     CAPTURE(std::string(mode));
     Sim sim = create_sim(cloth_on_box(), of_cloth(mode));

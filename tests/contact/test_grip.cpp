@@ -64,7 +64,7 @@ double fall(const std::string& mode, bool pads, double of_threshold, double seco
 
 }  // namespace
 
-TEST_CASE("a grip holds by friction above its threshold, and lets slide below") {
+TEST_CASE("a grip holds by friction above its threshold, and lets slide below (long)") {
   GlTest gl;
   for (const bool pads : {false, true})
     for (const char* mode : {"explicit", "newton"}) {

@@ -104,7 +104,7 @@ const std::vector<std::string> two_modes = {"cpu-double", "node"},
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: a stack of ten stands") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: a stack of ten stands (long)") {
   for (const std::string mode : {"cpu-fast", "node"}) {
     CAPTURE(mode);
     std::vector<Block> blocks;
@@ -125,7 +125,7 @@ TEST_CASE_FIXTURE(GlTest, "hard bodies: a stack of ten stands") {
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: friction stops one on another where it should") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: friction stops one on another where it should (long)") {
   for (const std::string& mode : two_modes) {
     CAPTURE(mode);
     Settings settings = hard(mode);
@@ -141,7 +141,7 @@ TEST_CASE_FIXTURE(GlTest, "hard bodies: friction stops one on another where it s
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: Newton's cradle of three") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: Newton's cradle of three (long)") {
   for (const std::string& mode : two_modes) {
     CAPTURE(mode);
     Settings settings = weightless(hard(mode));
@@ -156,7 +156,7 @@ TEST_CASE_FIXTURE(GlTest, "hard bodies: Newton's cradle of three") {
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: a stick that falls on its end turns as it should") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: a stick that falls on its end turns as it should (long)") {
   for (const std::string& mode : two_modes) {
     CAPTURE(mode);
     const Settings settings = weightless(hard(mode));
@@ -182,7 +182,7 @@ TEST_CASE_FIXTURE(GlTest, "hard bodies: a stick that falls on its end turns as i
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: momentum and energy of a blow off centre") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: momentum and energy of a blow off centre (long)") {
   for (const std::string& mode : all_modes) {
     CAPTURE(mode);
     Settings settings = weightless(hard(mode));
@@ -201,8 +201,8 @@ TEST_CASE_FIXTURE(GlTest, "hard bodies: momentum and energy of a blow off centre
   }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "hard bodies: a pile comes to rest, and its GPU run goes on from a snapshot to the same bits") {
+TEST_CASE_FIXTURE(
+    GlTest, "hard bodies: a pile comes to rest, and its GPU run goes on from a snapshot to the same bits (long)") {
   std::vector<Block> blocks;
   for (int k = 0; k < 8; ++k)
     blocks.push_back(

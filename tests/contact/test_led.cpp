@@ -66,7 +66,7 @@ constexpr std::array modes{"explicit", "node", "newton", "cpu-double", "cpu-fast
 
 }  // namespace
 
-TEST_CASE("led: a body that is led bats another away, which goes on as fast or faster") {
+TEST_CASE("led: a body that is led bats another away, which goes on as fast or faster (long)") {
   GlTest gl;
   for (const char* mode : modes) {
     CAPTURE(std::string(mode));
@@ -87,7 +87,7 @@ TEST_CASE("led: a body that is led bats another away, which goes on as fast or f
   }
 }
 
-TEST_CASE("led: pulled against what is fixed, nothing passes through, not even the vertices that are led") {
+TEST_CASE("led: pulled against what is fixed, nothing passes through, not even the vertices that are led (long)") {
   GlTest gl;
   for (const char* mode : modes)
     for (const double speed : {1.0, 8.0}) {
@@ -117,7 +117,7 @@ TEST_CASE("led: what is led from afar is seen in time, also where nothing else m
   }
 }
 
-TEST_CASE("led: a vertex goes evenly over the substeps of a step, and is still after it") {
+TEST_CASE("led: a vertex goes evenly over the substeps of a step, and is still after it (long)") {
   GlTest gl;
   for (const char* mode : modes) {
     CAPTURE(std::string(mode));

@@ -197,7 +197,7 @@ TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in every kind of mode") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in every kind of mode (long)") {
   std::vector<std::vector<Obstacle>> grounds = {
       {half_space({0, 1, 0})}, {box({1, 0.5, 1}, {0, -0.5, 0})}, {round_shape("cylinder", 1, 0.5, {0, -0.5, 0})}};
   grounds[0][0].friction = 0.5;
@@ -231,7 +231,8 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in eve
     }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode") {
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode (long)") {
   for (const std::string mode : {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "newton"})
     for (const double degrees : {25.0, 28.0}) {
       // The short suite has modes that share a contact at one angle each.
@@ -292,7 +293,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: a hard ball bounces off a sphere to the sq
     }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt and a turntable drag") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt and a turntable drag (long)") {
   for (const std::string mode : {"node", "cpu-double", "newton"}) {
     CAPTURE(mode);
     {
@@ -513,7 +514,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: others are taken over without new kernels 
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite (long)") {
   std::mt19937 random(seed_of_run(3));
   for (int round = 0; round < (is_long_run() ? 40 : 4); ++round) {
     CAPTURE(round);
@@ -588,7 +589,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what i
   std::filesystem::remove(file);
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: many substeps of what moves need no more memory, and meet the same") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: many substeps of what moves need no more memory, and meet the same (long)") {
   const auto run = [](const char* mode, int substeps, int steps) {
     Setup setup;
     add(setup, slab, {0, 0.12, 0});

@@ -124,7 +124,7 @@ TetMesh ball(int n, double radius) {
 
 }  // namespace
 
-TEST_CASE("offset contact: two cubes fall on a floor and on each other") {
+TEST_CASE("offset contact: two cubes fall on a floor and on each other (long)") {
   Stage s;
   s.settings.young_modulus = 3e5;
   s.floor(1);
@@ -138,7 +138,8 @@ TEST_CASE("offset contact: two cubes fall on a floor and on each other") {
   s.check();
 }
 
-TEST_CASE("offset contact: a block stays on a slope below the angle of friction, and slides as Coulomb has it above") {
+TEST_CASE(
+    "offset contact: a block stays on a slope below the angle of friction, and slides as Coulomb has it above (long)") {
   for (const double degrees : {20.0, 35.0}) {
     CAPTURE(degrees);
     Stage s;
@@ -169,7 +170,7 @@ TEST_CASE("offset contact: a block stays on a slope below the angle of friction,
   }
 }
 
-TEST_CASE("offset contact: a ball at 50 m/s bounces off a plate of 2 cm, fixed or soft") {
+TEST_CASE("offset contact: a ball at 50 m/s bounces off a plate of 2 cm, fixed or soft (long)") {
   for (const bool soft : {false, true}) {
     CAPTURE(soft);
     Stage s;
@@ -229,7 +230,7 @@ TEST_CASE("offset contact: a thin plate falls edge on edge on another and stays 
   s.check();
 }
 
-TEST_CASE("offset contact: a bent beam closes on itself without passing through") {
+TEST_CASE("offset contact: a bent beam closes on itself without passing through (long)") {
   Stage s;
   s.settings.young_modulus = 1e6, s.settings.gravity = 0, s.settings.friction = 0.3, s.settings.contact = "self";
   const TetMesh beam = make_block({1.6, 0.04, 0.04}, {40, 1, 1});
@@ -248,7 +249,7 @@ TEST_CASE("offset contact: a bent beam closes on itself without passing through"
   s.check(5e-3, 5e-3);
 }
 
-TEST_CASE("offset contact: a hundred times the mass on top, and below") {
+TEST_CASE("offset contact: a hundred times the mass on top, and below (long)") {
   for (const bool heavy : {true, false}) {
     CAPTURE(heavy);
     Stage s;
@@ -266,7 +267,7 @@ TEST_CASE("offset contact: a hundred times the mass on top, and below") {
   }
 }
 
-TEST_CASE("offset contact: two thousand times the mass stands on a cube") {
+TEST_CASE("offset contact: two thousand times the mass stands on a cube (long)") {
   Stage s;
   s.settings.young_modulus = 1e7;
   s.floor(1);
@@ -281,7 +282,7 @@ TEST_CASE("offset contact: two thousand times the mass stands on a cube") {
   s.check();
 }
 
-TEST_CASE("offset contact: what rests keeps its distance, whatever the meshes") {
+TEST_CASE("offset contact: what rests keeps its distance, whatever the meshes (long)") {
   for (const int cells : {1, 4}) {
     CAPTURE(cells);
     Stage s;
@@ -374,7 +375,7 @@ TEST_CASE("offset contact: bodies bounce as barriers have it") {
   }
 }
 
-TEST_CASE("offset contact: a stack of three and cloth on a ball rest where barriers have them") {
+TEST_CASE("offset contact: a stack of three and cloth on a ball rest where barriers have them (long)") {
   for (const bool cloth : {false, true}) {
     CAPTURE(cloth);
     Stage s;
@@ -438,7 +439,7 @@ TEST_CASE("offset contact: three cloths bear a block, and nothing goes through")
   s.check(1e-3, 1e-2);
 }
 
-TEST_CASE("offset contact: two blocks slide on each other as Coulomb has it") {
+TEST_CASE("offset contact: two blocks slide on each other as Coulomb has it (long)") {
   Stage s;
   s.settings.friction = 0.3;
   s.floor(1);

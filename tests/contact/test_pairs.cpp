@@ -110,7 +110,7 @@ TEST_CASE("pairs: proximity is the least distance of points, and its weights giv
   }
 }
 
-TEST_CASE("pairs: edges that cross stop each other, in every mode") {
+TEST_CASE("pairs: edges that cross stop each other, in every mode (long)") {
   GlTest gl;
   const double r = std::sqrt(0.5);
   Placed ridge{{0, 0, 0}}, keel{{0.07, 0.72, 0.09}, {0, -1, 0}};
@@ -143,7 +143,7 @@ TEST_CASE("pairs: edges that cross stop each other, in every mode") {
   }
 }
 
-TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy") {
+TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy (long)") {
   GlTest gl;
   const auto model = blocks({{{0, 0, 0}, {2, 0, 0}}, {{0.7, 0.13, 0.08}, {-1, 0, 0}, {0, 0, 2}}});
   std::vector<double> speeds;
@@ -171,7 +171,7 @@ TEST_CASE("pairs: two bodies that collide keep their momentum, part again and ga
   for (const double speed : speeds) CHECK(speed == doctest::Approx(speeds[0]).epsilon(0.05));
 }
 
-TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far apart") {
+TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far apart (long)") {
   GlTest gl;
   const auto near = blocks({{{0, 0, 0}, {1, 0, 0}}, {{0.52, 0.1, 0}, {-1, 0, 0}}, {{0.1, 0.55, 0.1}, {0, -1, 0}}});
   std::uint64_t bits = 0;
@@ -232,7 +232,7 @@ TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") 
   CHECK(cut.crossings.pairs == 4);  // two beside each edge
 }
 
-TEST_CASE("pairs: a block slides on another as friction says") {
+TEST_CASE("pairs: a block slides on another as friction says (long)") {
   GlTest gl;
   std::vector<std::uint32_t> all(125);
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
@@ -267,7 +267,7 @@ TEST_CASE("pairs: at 50 m/s and steps of 5 ms bodies do not pass through each ot
   }
 }
 
-TEST_CASE("pairs: three blocks on each other come to rest") {
+TEST_CASE("pairs: three blocks on each other come to rest (long)") {
   GlTest gl;
   std::vector<Placed> pile = {{{0, 0.25, 0}}, {{0.02, 0.75, 0.03}, {}, {0, 0.01, 0}}, {{0, 1.25, -0.02}}};
   for (Placed& block : pile) block.cells = glm::ivec3(is_long_run() ? 4 : 2);
@@ -343,7 +343,7 @@ TEST_CASE("pairs: what finds no room in a list is held, counted and does not cro
   }
 }
 
-TEST_CASE("pairs: bodies that start in each other are moved apart, and never cross") {
+TEST_CASE("pairs: bodies that start in each other are moved apart, and never cross (long)") {
   GlTest gl;
   std::mt19937 random(seed_of_run(7));
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -374,7 +374,7 @@ TEST_CASE("pairs: bodies that start in each other are moved apart, and never cro
   record_worst("bodies that start in each other: overlap over size", worst, 0.01);
 }
 
-TEST_CASE("pairs: after a state that is not finite, the last good one goes on as it did, in every mode") {
+TEST_CASE("pairs: after a state that is not finite, the last good one goes on as it did, in every mode (long)") {
   GlTest gl;
   Placed left{{0, 0, 0}, {0.7, 0, 0}}, right{{0.71, 0.02, 0.03}};  // they meet in step 60
   if (!is_long_run()) left.cells = right.cells = glm::ivec3(2);
@@ -415,7 +415,7 @@ TEST_CASE("pairs: thin plates above each other do not touch") {
   }
 }
 
-TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end finite and out of each other") {
+TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end finite and out of each other (long)") {
   GlTest gl;
   std::mt19937 random(seed_of_run(5));
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -461,7 +461,7 @@ TEST_CASE("pairs: modes without contact between bodies refuse it, and so do refe
                     doctest::Contains("no reference motion of bodies that touch"));
 }
 
-TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which bodies touch") {
+TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which bodies touch (long)") {
   GlTest gl;
   const auto model = blocks({{{-0.3, 0, 0}, {1, 0, 0}}, {{0.3, 0.06, 0.04}, {-1, 0, 0}}});
   Settings settings = touching("explicit", 1e5);

@@ -90,7 +90,7 @@ class RandomScene {
 
 }  // namespace
 
-TEST_CASE("random contact: bodies of all shapes, masses and speeds do not cross") {
+TEST_CASE("random contact: bodies of all shapes, masses and speeds do not cross (long)") {
   GlTest gl;
   const std::uint64_t first = seed_of_run(1);
   const auto file = std::filesystem::temp_directory_path() / ("tetpbd_random_" + std::to_string(getpid()) + ".json");

@@ -101,7 +101,7 @@ TEST_CASE_FIXTURE(GlTest, "ledger: a beam that swings turns what it stores into 
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "ledger: what friction takes from a block that slides to rest is what it had") {
+TEST_CASE_FIXTURE(GlTest, "ledger: what friction takes from a block that slides to rest is what it had (long)") {
   for (const std::string mode : {"node", "newton", "cpu-double"}) {
     CAPTURE(mode);
     Setup setup{
@@ -129,7 +129,7 @@ TEST_CASE_FIXTURE(GlTest, "ledger: energy from outside the laws is seen, to its 
 }
 
 // Impulse from an obstacle that moves at one velocity does work along that velocity, whatever the body does.
-TEST_CASE_FIXTURE(GlTest, "ledger: an obstacle that moves does the work that the body's momentum says") {
+TEST_CASE_FIXTURE(GlTest, "ledger: an obstacle that moves does the work that the body's momentum says (long)") {
   for (const std::string mode : {"node", "constraint", "explicit", "newton", "vbd", "cpu-double", "cpu-fast"})
     for (const char* material : {"neo-hookean", "none"}) {
       const SolverMode& row = *find_solver_mode(mode);
@@ -219,7 +219,7 @@ static const char* known_to_fail(const Setup& setup) {
   return nullptr;
 }
 
-TEST_CASE_FIXTURE(GlTest, "ledger: newton creates no energy where a stiff block lands on an edge or a corner") {
+TEST_CASE_FIXTURE(GlTest, "ledger: newton creates no energy where a stiff block lands on an edge or a corner (long)") {
   for (const double modulus : {1e9, 1e10, 2e11})
     for (const double height : {0.5, 3.0}) {
       if (!is_long_run() && (height < 3) == (modulus > 1e9)) continue;
@@ -232,7 +232,7 @@ TEST_CASE_FIXTURE(GlTest, "ledger: newton creates no energy where a stiff block 
     }
 }
 
-TEST_CASE_FIXTURE(GlTest, "ledger: blocks of any stiffness, at random, create no energy") {
+TEST_CASE_FIXTURE(GlTest, "ledger: blocks of any stiffness, at random, create no energy (long)") {
   std::mt19937 random(seed_of_run(5));
   const auto unit = [&] { return double(random()) / 4294967296.0; };
   const auto between = [&](double low, double high) { return low * std::pow(high / low, unit()); };

@@ -114,7 +114,7 @@ State run(Sim& sim, int steps) {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in every mode") {
+TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in every mode (long)") {
   for (const SolverMode& mode : solver_modes()) {
     CAPTURE(std::string(mode.name));
     auto bodies = mode.forces ? soft_bodies() : all_bodies();
@@ -185,7 +185,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: elastic energy is the sum of what each has al
   CHECK(elastic(all) == doctest::Approx(sum).epsilon(1e-5));
 }
 
-TEST_CASE_FIXTURE(GlTest, "bodies: settings are of those without a material of their own, also live") {
+TEST_CASE_FIXTURE(GlTest, "bodies: settings are of those without a material of their own, also live (long)") {
   const std::vector<Made> bodies = {soft_bodies()[0], soft_bodies()[3]};
   const auto model = together(bodies);
   for (const SolverMode& mode : solver_modes()) {
@@ -205,7 +205,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: settings are of those without a material of t
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of theirs") {
+TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of theirs (long)") {
   auto model = std::make_shared<Model>();
   add(*model, "below", 0), add(*model, "above", 0.1);
   for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i)
@@ -228,7 +228,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "bodies: each bounces off the ground, and off another, by its own restitution") {
+TEST_CASE_FIXTURE(GlTest, "bodies: each bounces off the ground, and off another, by its own restitution (long)") {
   auto model = std::make_shared<Model>();
   const TetMesh block = make_block(glm::dvec3(0.4), {2, 2, 2}, true);
   const auto add_block = [&](const glm::dvec3& at, const glm::dvec3& velocity) {
@@ -317,7 +317,7 @@ double height_at(const Model& model, const std::vector<glm::dvec3>& x, double y)
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory says") {
+TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory says (long)") {
   const auto model = column(true);
   Settings settings = pulled(2e4);
   double weight = 0;
@@ -345,7 +345,8 @@ TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory 
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "regions: of the body's own moduli change nothing, and a whole body is a region of others") {
+TEST_CASE_FIXTURE(GlTest,
+                  "regions: of the body's own moduli change nothing, and a whole body is a region of others (long)") {
   for (const std::string mode : {"newton", "explicit", "node", "constraint", "cpu"})
     for (const std::string material : {"neo-hookean", "springs"}) {
       CAPTURE(mode);

@@ -213,7 +213,7 @@ TEST_CASE("material: every mode keeps the rest state, and goes where the leapfro
     }
 }
 
-TEST_CASE("material: errors shrink with the substeps as those of a method of first order, in every mode") {
+TEST_CASE("material: errors shrink with the substeps as those of a method of first order, in every mode (long)") {
   const GlTest gl;
   for (const bool flies : {false, true}) {
     Scene scene = beam_of("neo-hookean", {4, 2, 2}, 2e5, 0.35);

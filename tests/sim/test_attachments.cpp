@@ -90,7 +90,7 @@ TEST_CASE("attached halves with vertices in the same places are one mesh") {
   CHECK(sag(one.host) < -0.052);  // it has moved
 }
 
-TEST_CASE("attached halves sag alike in every mode, and keep the gap that they had") {
+TEST_CASE("attached halves sag alike in every mode, and keep the gap that they had (long)") {
   GlTest gl;
   for (const double gap : {0.0, 0.01}) {
     CAPTURE(gap);
@@ -164,7 +164,7 @@ TEST_CASE("an attachment of some stiffness stretches by the weight over it") {
   }
 }
 
-TEST_CASE("an attachment lets go where more pulls than it bears, and holds again after going back") {
+TEST_CASE("an attachment lets go where more pulls than it bears, and holds again after going back (long)") {
   GlTest gl;
   for (const char* mode : {"node", "cpu-double", "explicit", "newton"})
     for (const double part : {0.7, 3.0}) {

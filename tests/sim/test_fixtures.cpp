@@ -58,7 +58,7 @@ double turn_at(const Model& model, const State& state, double y) {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest, "fixtures: an end that turns twists a bar evenly, in every mode") {
+TEST_CASE_FIXTURE(GlTest, "fixtures: an end that turns twists a bar evenly, in every mode (long)") {
   const auto model = bar({.keyframes = {{0.4, {0, 0, 0}, {0, 60, 0}}}});
   for (const SolverMode& mode : solver_modes()) {
     if (mode.published) continue;
@@ -84,7 +84,7 @@ TEST_CASE_FIXTURE(GlTest, "fixtures: an end that turns twists a bar evenly, in e
 }
 
 // The torque is the energy's derivative by the angle, 2 E over it where both are small.
-TEST_CASE_FIXTURE(GlTest, "fixtures: a twisted bar resists with the torque of Saint-Venant") {
+TEST_CASE_FIXTURE(GlTest, "fixtures: a twisted bar resists with the torque of Saint-Venant (long)") {
   Settings settings = settings_of("newton");
   settings.iterations = 12, settings.dt = 0.01, settings.element = "smoothed", settings.constraint_damping = 0.01;
   const auto torque = [&](int across) {
@@ -101,8 +101,8 @@ TEST_CASE_FIXTURE(GlTest, "fixtures: a twisted bar resists with the torque of Sa
   CHECK(limit == doctest::Approx(right).epsilon(0.02));
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "fixtures: one that goes at a speed pulls its body along, and what is in its way holds it back") {
+TEST_CASE_FIXTURE(
+    GlTest, "fixtures: one that goes at a speed pulls its body along, and what is in its way holds it back (long)") {
   auto model = std::make_shared<Model>();
   const TetMesh cube = make_block(glm::dvec3(0.2), glm::ivec3(3), true), wall = make_block({0.1, 0.5, 0.5}, {1, 4, 4});
   VertexList all, side;
@@ -130,7 +130,8 @@ TEST_CASE_FIXTURE(GlTest,
 }
 
 // Two stiff pads close on a soft block that lies on nothing, so that only friction holds it against its weight.
-TEST_CASE_FIXTURE(GlTest, "fixtures: pads hold a block above the friction that theory asks for, and drop it below") {
+TEST_CASE_FIXTURE(GlTest,
+                  "fixtures: pads hold a block above the friction that theory asks for, and drop it below (long)") {
   auto model = std::make_shared<Model>();
   const TetMesh block = make_block(glm::dvec3(0.2), glm::ivec3(3)), pad = make_block({0.05, 0.26, 0.26}, {1, 4, 4});
   add_body(*model, "block", block, 200, block.positions, {}, {}, {});

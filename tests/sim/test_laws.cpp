@@ -106,7 +106,7 @@ TEST_CASE("friction stops a sliding block and none does not") {
     }
 }
 
-TEST_CASE("a hard body hung by a corner swings as a rigid one, and gains no energy") {
+TEST_CASE("a hard body hung by a corner swings as a rigid one, and gains no energy (long)") {
   GlTest gl;
   const auto model = std::make_shared<Model>(*block_model({4, 3, 2}));
   const std::uint32_t pivot = 0;

@@ -70,7 +70,7 @@ TEST_CASE("factors over time are linear between their points") {
     CHECK(factor_at(factors, time) == doctest::Approx(factor));
 }
 
-TEST_CASE("an acceleration that fades gives the velocity of its integral, and its work is booked") {
+TEST_CASE("an acceleration that fades gives the velocity of its integral, and its work is booked (long)") {
   GlTest gl;
   for (const char* mode : modes) {
     CAPTURE(mode);
@@ -131,7 +131,7 @@ TetMesh shell(const Ball& ball, std::uint32_t layers, double inner, double outer
 
 }  // namespace
 
-TEST_CASE("pressure inside a thick sphere widens it by Lame's formula") {
+TEST_CASE("pressure inside a thick sphere widens it by Lame's formula (long)") {
   GlTest gl;
   constexpr double inner = 0.06, outer = 0.12, pressure = 50, E = 1e4, nu = 0.3;
   const double a3 = std::pow(inner, 3), b3 = std::pow(outer, 3);
@@ -167,7 +167,7 @@ TEST_CASE("pressure inside a thick sphere widens it by Lame's formula") {
   CHECK(std::abs((4 * fine - coarse) / 3 - 1) < 0.02);
 }
 
-TEST_CASE("wind drags a sheet up to where its force is the weight") {
+TEST_CASE("wind drags a sheet up to where its force is the weight (long)") {
   GlTest gl;
   for (const char* mode : modes) {
     CAPTURE(mode);
@@ -187,7 +187,7 @@ TEST_CASE("wind drags a sheet up to where its force is the weight") {
   }
 }
 
-TEST_CASE("active fibres shorten a bar by their share of its stiffness, and their work is booked") {
+TEST_CASE("active fibres shorten a bar by their share of its stiffness, and their work is booked (long)") {
   GlTest gl;
   constexpr double active = 0.02, E = 1e5, fibres = 5e4;
   for (const char* mode : modes) {
@@ -210,7 +210,7 @@ TEST_CASE("active fibres shorten a bar by their share of its stiffness, and thei
   }
 }
 
-TEST_CASE("viscosity makes a bar's first mode decay at the rate of its tensor") {
+TEST_CASE("viscosity makes a bar's first mode decay at the rate of its tensor (long)") {
   GlTest gl;
   // Viscosity of tau times the elastic tensor damps each mode by exp(-w^2 tau t / 2); along a bar w = pi c / (2 L).
   constexpr double E = 1e5, nu = 0.3, length = 0.8, tau = 4e-3;

@@ -138,7 +138,7 @@ constexpr glm::ivec3 sizes[] = {{1, 1, 1}, {4, 3, 2}, {9, 7, 5}};
 
 }  // namespace
 
-TEST_CASE("any order and size of work-groups gives the same state") {
+TEST_CASE("any order and size of work-groups gives the same state (long)") {
   GlTest gl;
   for (const std::string& mode : gpu_modes())
     for (const glm::ivec3& cells : sizes) {
@@ -165,7 +165,7 @@ TEST_CASE("any order and size of work-groups gives the same state") {
     }
 }
 
-TEST_CASE("any order and size of work-groups gives the same measurements, picks and pictures") {
+TEST_CASE("any order and size of work-groups gives the same measurements, picks and pictures (long)") {
   GlTest gl;
   const auto model = falling({7, 6, 5}, 2);
   struct Answers {
@@ -222,7 +222,7 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
   }
 }
 
-TEST_CASE("sums by floats depend on the order of work-groups, sums by integers do not") {
+TEST_CASE("sums by floats depend on the order of work-groups, sums by integers do not (long)") {
   GlTest gl;
   const auto model = falling({9, 7, 5});
   // Mode paper adds floats by compare-and-swap, as published: `bench` measures it, nothing else uses it.
@@ -251,7 +251,7 @@ TEST_CASE("sums by floats depend on the order of work-groups, sums by integers d
   CHECK(different >= 2);
 }
 
-TEST_CASE("other work on the GPU at the same time changes no bit") {
+TEST_CASE("other work on the GPU at the same time changes no bit (long)") {
   GlTest gl;
   const auto model = falling({8, 6, 4});
   std::vector<std::uint64_t> expected;

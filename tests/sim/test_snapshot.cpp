@@ -124,7 +124,7 @@ TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of the
   }
 }
 
-TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and after contact") {
+TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and after contact (long)") {
   GlTest gl;
   for (const SolverMode& mode : solver_modes()) {
     if (!mode.pairs) continue;
@@ -171,7 +171,7 @@ TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and
   }
 }
 
-TEST_CASE("snapshot: back in time in another mode, in contact, is the same as starting there from that state") {
+TEST_CASE("snapshot: back in time in another mode, in contact, is the same as starting there from that state (long)") {
   GlTest gl;
   auto model = std::make_shared<Model>();
   const TetMesh block = make_block(glm::dvec3(0.5), {2, 2, 2});

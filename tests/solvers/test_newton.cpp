@@ -410,7 +410,7 @@ int inverted_tets(const Sim& sim) {
 
 }  // namespace
 
-TEST_CASE("newton: hostile starts end whole") {
+TEST_CASE("newton: hostile starts end whole (long)") {
   GlTest gl;
   for (const char* material : {"neo-hookean", "smoothed"})
     for (const std::string how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "flatten"}) {
@@ -464,7 +464,7 @@ TEST_CASE("newton: three iterations keep the momentum and the energy of stiff fr
   CHECK(glm::length(of_body(model->bodies[2]).first - before[2].first) > 0.1 * glm::length(before[2].first));
 }
 
-TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no tet is inverted") {
+TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no tet is inverted (long)") {
   GlTest gl;
   Settings stiff = soft("neo-hookean");
   stiff.young_modulus = 1e8, stiff.poisson_ratio = 0.495, stiff.iterations = 8;
@@ -573,7 +573,7 @@ TEST_CASE("newton: with other steps or forces while running it is soon as if mad
   }
 }
 
-TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else") {
+TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else (long)") {
   GlTest gl;
   TetMesh one;
   one.positions = {{0, 5, 0}, {1, 5, 0}, {0, 6, 0}, {0, 5, 1}};

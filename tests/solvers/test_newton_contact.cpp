@@ -64,7 +64,8 @@ Outcome after(const Block& block, const Settings& settings, double seconds) {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest, "newton: a block at rest stays at rest, whatever its stiffness, its density and the step") {
+TEST_CASE_FIXTURE(GlTest,
+                  "newton: a block at rest stays at rest, whatever its stiffness, its density and the step (long)") {
   for (const double modulus : {1e7, 1e9, 1e12})
     for (const double density : {1.0, 1e3})
       for (const double dt : {0.002, 0.02}) {
@@ -87,8 +88,8 @@ TEST_CASE_FIXTURE(GlTest, "newton: a soft block sags on the ground and stays whe
   CHECK(rest.moved.y < 0);
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "newton: below the angle of friction a block stops, at any size, and above it slides as it should") {
+TEST_CASE_FIXTURE(
+    GlTest, "newton: below the angle of friction a block stops, at any size, and above it slides as it should (long)") {
   for (const double modulus : {1e6, 1e9})
     for (const double size : {0.4, 0.001}) {
       if (size < 0.01 && modulus > 1e6) continue;  // stiffer than floats tell, and the same therefore
@@ -133,7 +134,7 @@ TEST_CASE_FIXTURE(GlTest, "newton: a stiff block that lands comes to rest where 
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "newton: blocks of any stiffness that fall on a corner, spinning, create no energy") {
+TEST_CASE_FIXTURE(GlTest, "newton: blocks of any stiffness that fall on a corner, spinning, create no energy (long)") {
   struct Fall {
     double modulus, density, dt, height;
     glm::dvec3 turn, spin;

@@ -366,7 +366,7 @@ TEST_CASE("sheets: a ball and another sheet fall on one that is held, and stay o
   }
 }
 
-TEST_CASE("sheets: one that folds onto itself does not go through itself where that is asked for") {
+TEST_CASE("sheets: one that folds onto itself does not go through itself where that is asked for (long)") {
   GlTest gl;
   auto model = std::make_shared<Model>();
   const TetMesh sheet = make_sheet({0.4, 1}, {12, 30});

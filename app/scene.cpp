@@ -109,9 +109,11 @@ fs::path find_scene(const std::string& name_or_file) {
   if (!fs::is_regular_file(file, error) && file.extension() != ".json")
     file = models_folder() / "scenes" / (name_or_file + ".json");
   if (fs::is_regular_file(file, error)) return file;
-  const bool hard = name_or_file.starts_with("hard/");
-  std::vector<std::string> names = scene_names(hard ? "scenes/hard" : "scenes");
-  for (std::string& name : names) name.insert(0, hard ? "hard/" : "");
+  // Names with a folder, such as hard/line, are compared with those of that folder.
+  fs::path folder = fs::path(name_or_file).parent_path();
+  std::vector<std::string> names = scene_names(("scenes" / folder.relative_path()).string());
+  if (folder.is_absolute() || names.empty()) folder.clear(), names = scene_names();
+  for (std::string& name : names) name = (folder / name).string();
   throw Error(
       "no such scene", name_or_file,
       did_you_mean(name_or_file, names) + fmt::format("give a .json file or one of {} in {}", fmt::join(names, ", "),

@@ -5,11 +5,14 @@ docs/make_page.py                 writes both, from docs/page.template.html, doc
 docs/make_page.py check           fails where one of them differs from what would be written
 docs/make_page.py count PROGRAM   prints what stands in `tets` below, counted by PROGRAM (minutes)
 """
-import html, json, pathlib, re, struct, subprocess, sys
+import html, json, re, struct, subprocess, sys
 
-docs = pathlib.Path(__file__).resolve().parent
+sys.dont_write_bytecode = True  # An import leaves no folder among the pages.
+from tables import docs, load, percent, thousands
+
 root = docs.parent
 esc = html.escape
+narrow = "\u202f"  # This space stands between thousands.
 
 # Tets of a scene, with the default fill; 0: sheets alone.
 tets = {
@@ -34,18 +37,6 @@ doors = [("Learn", "tutorial.md", "From a first drop to a stability map, in shor
          ("Compare solvers", "results.md", "Time and error of every solver on the same scenes, and where each one fails.", "Results"),
          ("Read and lift kernels", "extending.md", "The compute shaders, in an order to read them in; how to add a constraint or a solver.", "Extending"),
          ("Bring a mesh", "guide.md#meshes", "Check, repair and tetrahedralize your own surface; film it, export it.", "Guide")]
-
-
-def load(path):
-    return json.loads(path.read_text())
-
-
-def percent(value):
-    return f"{float(f'{100 * value:.2g}'):f}".rstrip("0").rstrip(".") + " %"
-
-
-def thousands(number):
-    return f"{number:,}".replace(",", "\u202f")
 
 
 def size(path):
@@ -93,7 +84,7 @@ def shown(scene):
 def scene_cards():
     cards = []
     for s in scenes():
-        count = f' <small>{thousands(s["tets"])} tets</small>' if s["tets"] else ""
+        count = f' <small>{thousands(s["tets"], narrow)} tets</small>' if s["tets"] else ""
         cards.append(f'<li class="card" data-name="{s["name"]}"><img src="{s["picture"]}" width="192" height="144" loading="lazy" alt="">'
                      f'<div><h3>{s["name"]}{count}</h3><p>{esc(shown(s), False)}</p></div>'
                      f'<code class="cmd">tetpbd view --scene {s["name"]}</code></li>')
@@ -101,7 +92,8 @@ def scene_cards():
 
 
 def scene_page():
-    rows = [f'| ![{s["name"]}]({s["picture"]}) | `{s["name"]}` | {shown(s)} | {thousands(s["tets"]) if s["tets"] else "–"} | '
+    tet_count = lambda s: thousands(s["tets"], narrow) if s["tets"] else "–"
+    rows = [f'| ![{s["name"]}]({s["picture"]}) | `{s["name"]}` | {shown(s)} | {tet_count(s)} | '
             f'`tetpbd view --scene {s["name"]}` |' for s in scenes()]
     return ("# Scenes\n\nThe scenes in `models/scenes`, each of them a JSON file [to start from](guide.md#scenes). "
             "Written by `docs/make_page.py`; “–”: no tets, sheets alone.\n\n"
@@ -133,7 +125,8 @@ def measured():
             steps = re.search(r"--steps (\d+)", row["command"])
             if steps and "text" not in group:
                 dt = load(root / f"models/scenes/{row['scene']}.json")["solver"]["dt"]
-                group["text"] = f"{thousands(row['tets'])} tets, {int(steps[1]) * dt:g} s of motion in steps of {1000 * dt:g} ms"
+                group["text"] = (f"{thousands(row['tets'], narrow)} tets, {int(steps[1]) * dt:g} s of motion "
+                                 f"in steps of {1000 * dt:g} ms")
                 group["text"] += f"; {notes[key]}" if key in notes else ""
             group["rows"].append({**{k: row.get(k) for k in ("mode", "substeps", "iterations", "runs", "command", "gpu_ms", "wall_ms",
                                                              "gpu_ms_flight", "gpu_ms_contact")},
@@ -155,8 +148,9 @@ def front_tables():
         for row in group["rows"]:
             low, middle, high = row["gpu_ms"] or row["wall_ms"]
             rows.append(cells("td", f"<code>{row['mode']}</code>", f"{row['substeps']} × {row['iterations']}",
-                              f"{middle:.3g}", f"{low:.4g}–{high:.4g}" if row["runs"] > 1 else "one run", percent(row["size"]),
-                              "–" if row["displacement"] is None else percent(row["displacement"]), f"<code>{esc(row['command'], False)}</code>"))
+                              f"{middle:.3g}", f"{low:.4g}–{high:.4g}" if row["runs"] > 1 else "one run",
+                              percent(row["size"], 2), percent(row["displacement"], 2),
+                              f"<code>{esc(row['command'], False)}</code>"))
         head = cells("th", "mode", "substeps × iterations", "ms per step", "quartiles", "error", "relative to displacement", "command")
         out.append(f'<div class="wide"><table><caption>{group["title"]}: {group.get("text", "")}</caption><thead>{head}</thead><tbody>'
                    + "\n".join(rows) + "</tbody></table></div>")
@@ -200,7 +194,8 @@ def machines():
 def machine_rows():
     rows = []
     for m in machines():
-        run = lambda name: f"<b>{m['runs'][name][0]:.3g}</b><small>{percent(m['runs'][name][1])}</small>" if name in m["runs"] else "–"
+        cost = lambda ms, error: f"<b>{ms:.3g}</b><small>{percent(error, 2)}</small>"
+        run = lambda name: cost(*m["runs"][name]) if name in m["runs"] else "–"
         rows.append(cells("td", f"{esc(m['gpu'])}<small>{esc(m['driver'])}; {esc(m['cpu'])}; {m['date']}</small>", *map(run, timed),
                           *(f"<b>{m[k]:.3g}</b>" if k == "dispatch_us" else f"<b>{m[k]:.4g}</b>" if k in m else "–" for k in ("dispatch_us", "copy_gb_s")),
                           m.get("checks", "–")))

@@ -39,25 +39,17 @@ docs/make_tables.py scans NOTE TABLE.csv ...: what becomes of surfaces as people
 
   tests/scans.sh build/release/tetpbd TABLE.csv SURFACE...
 """
-import csv, json, pathlib, shutil, sys
+import csv, functools, pathlib, shutil, sys
 
-docs = pathlib.Path(__file__).parent
+sys.dont_write_bytecode = True  # An import leaves no folder among the pages.
+import tables
+from tables import docs, load, rounded, thousands
 
-
-def table(head, rows):
-    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in [head, ["---"] * len(head), *rows]) + "\n"
-
-
-def number(text, digits=4):
-    return f"{float(text):.{digits}g}" if text not in ("", None) else "–"
-
-
-def thousands(count):
-    return f"{int(count):,}".replace(",", " ")
+table = functools.partial(tables.table, gap=" ")
 
 
 def write(name, parts):
-    (docs / "generated" / name).write_text("\n".join(parts).rstrip() + "\n")
+    (docs / "generated" / name).write_text("\n\n".join(parts).rstrip() + "\n")
 
 
 def read(path):
@@ -66,22 +58,24 @@ def read(path):
 
 def fronts(source, date):
     source = pathlib.Path(source)
-    device = json.load(open(source / "c/bunny/compare.json"))["device"]
-    out = ["# Speed against error: the tables\n",
+    device = load(source / "c/bunny/compare.json")["device"]
+    out = ["# Speed against error: the tables",
            f"Written by `docs/make_tables.py fronts`; its head has the commands, [results.md](../results.md) what they mean. "
-           f"{device['gl_renderer']}, OpenGL {device['gl_version']}, {date}.\n"]
+           f"{device['gl_renderer']}, OpenGL {device['gl_version']}, {date}."]
     for scene in ("bunny", "armadillo", "dragon", "bunny-100k"):
         shutil.copy(source / f"c/{scene}/compare.svg", docs / f"figures/compare_{scene}.svg")
         rows = [r for r in read(source / f"c/{scene}/compare.csv") if r["finite"] == "true"]
         for row in rows:
             row["ms"] = float(row["gpu_ms_per_step"] or row["wall_ms_per_step"])
             row["lost"] = float(row["max_volume_loss_percent"])
-        common = lambda r: [r["mode"], number(r["omega"]), r["iterations"], r["substeps"], number(r["ms"]), number(r["lost"], 3)]
+        common = lambda r: [r["mode"], rounded(r["omega"]), r["iterations"], r["substeps"], rounded(r["ms"]),
+                            rounded(r["lost"], 3)]
         head = ["ω", "iterations", "substeps", "ms per step", "largest loss %"]
         front = sorted((r for r in rows if r["pareto"] == "true"), key=lambda r: r["ms"])
-        out.append(f"## {scene}: {rows[0]['tets']} tets\n")
+        out.append(f"## {scene}: {rows[0]['tets']} tets")
         out.append(table(["on the front", *head, "rigid distance at the end", "left of a 5 % stretch after one step"],
-                         [common(r) + [number(r["rigid_distance"], 3), number(r["reference_distance"], 3)] for r in front]))
+                         [[*common(r), *(rounded(r[key], 3) for key in ("rigid_distance", "reference_distance"))]
+                          for r in front]))
         ours, lines = [r for r in rows if r["mode"].startswith("node")], []
         for r in (r for r in rows if r["mode"] in ("paper", "cpu-fast")):
             within = min((o["lost"] for o in ours if o["ms"] <= r["ms"]), default=None)
@@ -89,7 +83,8 @@ def fronts(source, date):
             less = "–" if within is None else f"{'over ' * (within < 0.01)}{r['lost'] / max(within, 0.01):.0f}"
             lines.append(common(r) + [less, "–" if good is None else f"{r['ms'] / good:.0f}"])
         out.append("Against each setting of `paper` and `cpu-fast`, the best of mode `node`: how many times less "
-                   "net volume loss in no more time (below 0.01 % counts as 0.01), how many times faster at no more loss:\n")
+                   "net volume loss in no more time (below 0.01 % counts as 0.01), how many times faster at no more "
+                   "loss:")
         out.append(table(["against", *head, "times less error", "times faster"], lines))
     heading = "## Readings of the paper"
     # Searched for once, no longer measured.
@@ -100,20 +95,21 @@ def fronts(source, date):
 def performance(*files):
     rows, limits, device = {}, None, None
     for name in files:
-        bench = json.load(open(name))
+        bench = load(name)
         limits, device = limits or bench["floors"], bench["device"]
         for r in bench["rows"]:
             rows[tuple(r[k] for k in ("scene", "mode", "constraints", "iterations", "substeps", "size", "picture"))] = r
     rows = sorted(rows.values(), key=lambda r: (r["tets"], r["size"], r["picture"], r["mode"], r["iterations"]))
-    lost = lambda r: number(r["max_volume_loss_percent"], 3)
+    lost = lambda r: rounded(r["max_volume_loss_percent"], 3)
     us = lambda r: 1e3 * (r["gpu_ms_per_step"]["median"] or r["wall_ms_per_step"]["median"])
     alone = [r for r in rows if r["size"] == "" and r["constraints"] == "stretch+bend+volume"]
     single = [r for r in alone if r["substeps"] == 1]
     most = {(r["scene"], r["mode"]): r for r in single}  # of the largest number of iterations
-    out = ["# What a step costs: the tables\n",
-           "Written by `docs/make_tables.py performance`; its head has the commands, [results.md](../results.md#what-a-step-costs) what they mean.\n",
+    out = ["# What a step costs: the tables",
+           "Written by `docs/make_tables.py performance`; its head has the commands, "
+           "[results.md](../results.md#what-a-step-costs) what they mean.",
            f"{device['gl_renderer']}, OpenGL {device['gl_version']}: {limits['dispatch_us']:.2f} µs a dispatch with its barrier, "
-           f"{limits['copy_gb_s']:.0f} GB/s copied.\n", "An iteration, all constraints:\n"]
+           f"{limits['copy_gb_s']:.0f} GB/s copied.", "An iteration, all constraints:"]
     lines = []
     for (scene, mode), r in most.items():
         each, paper = us(r) / r["iterations"], most.get((scene, "paper"))
@@ -124,10 +120,10 @@ def performance(*files):
                       f"{100 * launches / each:.0f} %", f"{r['gpu_bytes'] / r['tets']:.0f}", r["iterations"], lost(r)])
     out.append(table(["scene", "tets", "mode", "µs", "times as fast as paper", "ps per tet", "MB", "of the copied bandwidth", "of it launches",
                       "bytes per tet", "iterations", "volume lost %"], lines))
-    out.append("Steps per second, simulation alone:\n")
+    out.append("Steps per second, simulation alone:")
     out.append(table(["scene", "mode", "iterations", "steps per second", "volume lost %"],
                      [[r["scene"], r["mode"], r["iterations"], f"{r['fps']['median']:.0f}", lost(r)] for r in single]))
-    out.append("Frames with a picture, µs:\n")
+    out.append("Frames with a picture, µs:")
     lines = []
     for r in (r for r in rows if r["size"] and r["draw_ms"] and r["substeps"] == 1):
         step, draw, frame = 1e3 * (r["gpu_ms_per_step"]["median"] or 0), 1e3 * r["draw_ms"], 1e3 * r["wall_ms_per_step"]["median"]
@@ -136,7 +132,7 @@ def performance(*files):
     out.append(table(["scene", "mode", "iterations", "size", "picture", "fps", "frame", "step", "picture alone", "frame against both"], lines))
     several = [r for r in alone if r["substeps"] > 1]
     if several:
-        out.append("Several substeps:\n")
+        out.append("Several substeps:")
         out.append(table(["scene", "tets", "mode", "substeps", "iterations", "µs per step", "volume lost %"],
                          [[r["scene"], thousands(r["tets"]), r["mode"], r["substeps"], r["iterations"], f"{us(r):.1f}", lost(r)] for r in several]))
     write("performance.md", out)
@@ -146,7 +142,7 @@ def stability(note, *folders):
     modes = ["cpu-double", "cpu", "cpu-fast", "node", "constraint", "node-substeps", "paper"]
     rows = {}
     for folder in folders:
-        for r in json.load(open(pathlib.Path(folder) / "stability.json"))["rows"]:
+        for r in load(pathlib.Path(folder) / "stability.json")["rows"]:
             rows[r["case"], r["mesh"], r["mode"]] = r
     cases, meshes = sorted({c for c, _, _ in rows}), ("bunny", "block", "tet")
 
@@ -161,12 +157,13 @@ def stability(note, *folders):
         return f"never ({r['final_volume_error_percent']:.3g} %{inverted})"
 
     recovered = lambda *key: (r := rows.get(key)) is not None and r["recovered_at_step"] is not None
-    out = ["# Hard cases: the tables\n",
-           f"Written by `docs/make_tables.py stability`; its head has the commands, [results.md](../results.md#hard-cases) what they mean. {note}\n",
+    out = ["# Hard cases: the tables",
+           "Written by `docs/make_tables.py stability`; its head has the commands, "
+           f"[results.md](../results.md#hard-cases) what they mean. {note}",
            "A number is the step from which to the end of the run the volume is within 1 %, no tet is inverted and a hard body's shape is within 1 % of its size; \"never\" has the final volume "
-           "error and the inverted tets; \"–\": not run.\n"]
+           "error and the inverted tets; \"–\": not run."]
     for mesh in meshes:
-        out.append(f"## {mesh}\n")
+        out.append(f"## {mesh}")
         lines = []
         for case in (c for c in cases if any((c, mesh, m) in rows for m in modes)):
             by = [m for m in modes[3:] if recovered(case, mesh, m)]
@@ -180,16 +177,16 @@ def stability(note, *folders):
             if r and any(r.get(n, 0) for n in names):
                 lines.append([f"`{case}`", mesh, *(f"{r[n]:.3g}" if r.get(n) else "" for n in names)])
     out.append("## Which guard a case needs\n\nHow often each [guard](../method.md#guards) triggered, in mode `node` where that was counted (else in mode "
-               "`cpu`); cases in which none did are left out.\n")
+               "`cpu`); cases in which none did are left out.")
     out.append(table(["case", "mesh", *(n[6:] for n in names)], lines))
     scenes = docs.parent / "models/scenes/hard"
-    out.append("## The cases\n")
-    out.append(table(["case", ""], [[f"`{c}`", json.load(open(scenes / f"{c}.json"))["description"]] for c in cases]))
+    out.append("## The cases")
+    out.append(table(["case", ""], [[f"`{c}`", load(scenes / f"{c}.json")["description"]] for c in cases]))
     write("stability.md", out)
 
 
-def verdicts(note, *tables):
-    rows = sorted((row for name in tables for row in csv.DictReader(open(name))), key=lambda row: row["scene"])
+def verdicts(note, *files):
+    rows = sorted((row for name in files for row in read(name)), key=lambda row: row["scene"])
     modes = ["node", "gauss-seidel", "explicit", "newton", "vbd", "cpu-fast"]
     modes = [mode for mode in modes if any(row["mode"] == mode for row in rows)]
     of = {(row["scene"], row["mode"]): row for row in rows}
@@ -205,19 +202,23 @@ def verdicts(note, *tables):
         return f"**{word}**" + (f" ({', '.join(parts)})" if parts else "")
 
     scenes = sorted({row["scene"] for row in rows})
-    write("verdicts.md", ["# What still goes wrong: the table\n",
-          f"Written by `docs/make_tables.py verdicts`; its head has the command, [the guide](../guide.md#the-verdict) what verdicts mean. {note}\n",
-          "In brackets: energy that came from nothing, of what the scene has, and tets inverted at the end; \"–\": a mode that does not take the scene.\n",
+    write("verdicts.md", ["# What still goes wrong: the table",
+          "Written by `docs/make_tables.py verdicts`; its head has the command, "
+          f"[the guide](../guide.md#the-verdict) what verdicts mean. {note}",
+          "In brackets: energy that came from nothing, of what the scene has, and tets inverted at the end; "
+          "\"–\": a mode that does not take the scene.",
           table(["scene", *modes], [[f"`{s}`", *(cell(of.get((s, m))) for m in modes)] for s in scenes])])
 
 
-def scans(note, *tables):
-    rows = sorted((row for name in tables for row in csv.DictReader(open(name))), key=lambda row: row["surface"])
+def scans(note, *files):
+    rows = sorted((row for name in files for row in read(name)), key=lambda row: row["surface"])
     moduli = ["1e4", "1e5", "1e6"]
-    cell = lambda row, m: f"{number(row['created_' + m], 2)} %, {row['inverted_' + m]}" if row["inverted_" + m] else row["created_" + m]
-    write("scans.md", ["# Surfaces as people bring them: the table\n",
-          f"Written by `docs/make_tables.py scans`; its head has the command. {note}\n",
-          "By Young's modulus in Pa: energy that came from nothing, of what the scene has, and tets inverted at the end.\n",
+    both = lambda created, inverted: f"{rounded(created, 2)} %, {inverted}" if inverted else created
+    cell = lambda row, m: both(row["created_" + m], row["inverted_" + m])
+    write("scans.md", ["# Surfaces as people bring them: the table",
+          f"Written by `docs/make_tables.py scans`; its head has the command. {note}",
+          "By Young's modulus in Pa: energy that came from nothing, of what the scene has, "
+          "and tets inverted at the end.",
           table(["surface", "tets", *moduli], [[f"`{row['surface']}`", row["tets"], *(cell(row, m) for m in moduli)] for row in rows])])
 
 

@@ -16,7 +16,7 @@ measure() {  # TIMES WORDS...
   mkdir -p "$work/$part/$number"
   echo "tetpbd ${*:2}" >"$work/$part/$number/command"
   for k in $(seq "$times"); do
-    "$program" "${@:2}" --out "$work/$part/$number/$k" >"$work/log" 2>&1 || [[ $? == 1 && -e $work/part/$number/$k ]] ||
+    "$program" "${@:2}" --out "$work/$part/$number/$k" >"$work/log" 2>&1 || [[ $? == 1 && -e $work/$part/$number/$k ]] ||
       { tail -n 3 "$work/log" >&2; return 1; }
   done
 }
@@ -66,6 +66,19 @@ rivals() {
   done
 }
 
+# Scenes of other programs, at their own steps. The reference motion of a damped beam takes minutes, once.
+published() {
+  local scene
+  for scene in "sofa-beam --steps 50" "sofa-beam-fine --steps 10" "newton-beams --steps 60"; do
+    # shellcheck disable=SC2086
+    measure "$runs" compare --scene published/$scene --judge motion --modes newton --iterations 2,4 --substeps 1,4
+    # shellcheck disable=SC2086
+    measure "$runs" compare --scene published/$scene --judge motion --modes vbd --iterations 10 --substeps 10
+  done
+  measure "$runs" run --scene published/mgpbd-bunny --steps 1 --iterations 100 --csv-every 0
+  measure "$runs" run --scene published/vbd-ball --steps 20 --csv-every 0
+}
+
 copies() {
   for count in 1 8 64 512; do
     measure "$runs" run --scene jelly-beam --mode explicit --copies $count --steps 400 --measure-every 1000 --csv-every 0
@@ -73,7 +86,7 @@ copies() {
 }
 
 mkdir -p "$data"
-[[ $# -gt 0 ]] || set -- hard beam bunny rivals copies
+[[ $# -gt 0 ]] || set -- hard beam bunny rivals published copies
 for part in "$@"; do
   [[ -e $data/$part.json ]] && continue
   mkdir -p "$work/$part"

@@ -12,7 +12,9 @@ docs/measure.sh does not measure; what is not known about them is null.
 """
 import datetime, json, pathlib, re, statistics, sys
 
-docs = pathlib.Path(__file__).resolve().parent
+sys.dont_write_bytecode = True  # An import leaves no folder among the pages.
+from tables import docs, load, number, percent, table
+
 pages = [docs.parent / "README.md", *sorted(docs.glob("*.md"))]
 
 
@@ -34,7 +36,7 @@ def processor():
 def rows_of(run):
     """Of one run of a command: what tells its rows apart, times and errors."""
     if (run / "compare.json").exists():
-        document = json.loads((run / "compare.json").read_text())
+        document = load(run / "compare.json")
         for row in document["rows"]:
             median = lambda v: v["median"] if isinstance(v, dict) else v
             yield document["device"], {
@@ -42,12 +44,13 @@ def rows_of(run):
                                                  "motion_relative", "rise", "finite")},
                 "gpu_ms": median(row["gpu_ms_per_step"]), "wall_ms": median(row["wall_ms_per_step"])}
     else:
-        s = json.loads((run / "stats.json").read_text())
+        s = load(run / "stats.json")
         gpu, wall = s["timing"]["gpu_ms_per_step"] or {}, s["timing"]["wall_ms_per_step"] or {}
         yield s["device"], {
             "scene": s["scene"], "mode": s["settings"]["mode"], "iterations": s["settings"]["iterations"],
             "substeps": s["settings"]["substeps"], "tets": s["mesh"]["tets"], "finite": s["finite"],
             "motion_final": s["error"]["motion_final"], "motion_relative": s["error"].get("motion_relative"),
+            "residual": s.get("watch", {}).get("largest_residual"),
             "gpu_ms": gpu.get("median"), "wall_ms": wall.get("median"),
             "gpu_ms_flight": gpu.get("p05"), "gpu_ms_contact": gpu.get("p95"),
             "copies": s["timing"].get("copies", 1), "fps": s["timing"]["fps"]}
@@ -74,14 +77,10 @@ def collect(folder, file, commit):
 
 
 # ------------------------------------------------------------------------------------------------ from files to pages
-def read(part):
-    file = docs / "data" / f"{part}.json"
-    return json.loads(file.read_text()) if file.exists() else None
-
-
 def data(part):
     """A part as measure.sh left it, else as earlier.json has it; its rows say by what command and when they were measured."""
-    found = read(part) or read("earlier").get(part)
+    file = docs / f"data/{part}.json"
+    found = load(file) if file.exists() else load(docs / "data/earlier.json").get(part)
     if found:
         found["rows"] = [{"command": found.get("command"), "date": found.get("date"), **row} for row in found["rows"]]
     return found
@@ -101,19 +100,6 @@ def pick(part, words="", **values):
             and all(word in (row["command"] or "").split() for word in words.split())]
 
 
-def number(value, digits=3):
-    if value is None:
-        return "–"
-    if not isinstance(value, float):
-        return f"{value:,}".replace(",", " ") if isinstance(value, int) else value
-    text = f"{float(f'{value:.{digits}g}'):f}"
-    return text.rstrip("0").rstrip(".").replace("-", "−")
-
-
-def percent(value, digits=3):
-    return "–" if value is None else f"{number(100.0 * value, digits)} %"
-
-
 def share(field, digits=2):
     """A column of per cents, the sign of which stands in its head."""
     return lambda row: "–" if row.get(field) is None else number(100.0 * row[field], digits)
@@ -131,11 +117,6 @@ def after(flag):
 def ms(row):
     cost = next((row[key] for key in ("gpu_ms", "wall_ms", "ms") if row.get(key)), None)
     return number(cost[1] if isinstance(cost, list) else cost)
-
-
-def table(head, rows):
-    line = lambda cells: f"|{'|'.join(cells)}|"
-    return "\n".join(map(line, [head, ["---"] * len(head), *rows]))
 
 
 def source(name, *others):
@@ -210,6 +191,20 @@ def solver_table(name, scenes):
     return table(head, lines) + "\n\n" + source(name, "rivals")
 
 
+def published_table():
+    """Scenes of other programs: what these take by their own numbers, then what this one takes."""
+    lines, ours = [], data("published")["rows"]
+    for scene in dict.fromkeys(row["scene"] for row in data("elsewhere")["rows"]):
+        rows = [row for row in ours if row["scene"] == scene]
+        size = f", {number(rows[0]['tets'])} tets" if rows else ""
+        lines.append([f"**`published/{scene}`**{size}", "", "", ""])
+        lines += [[row["program"], row["machine"], ms(row), "–"] for row in data("elsewhere")["rows"] if row["scene"] == scene]
+        for row in rows:
+            error = percent(row["motion_final"], 2) if row["motion_final"] is not None else f"residual {percent(row['residual'], 2)}"
+            lines.append([f"`{row['mode']}`, {row['substeps']} × {row['iterations']}", "", ms(row), error])
+    return table(["scene, program, setting", "machine", "ms per step", "error"], lines) + "\n\n" + source("published")
+
+
 def copies_table():
     part = data("copies")
     one = part["rows"][0]["fps"][1]
@@ -237,6 +232,7 @@ tables = {
     "bunny": lambda: solver_table("bunny", [("clamped-bunny --young-modulus 5e4", "50 kPa"),
                                             ("clamped-bunny --young-modulus 1e6", "1 MPa")]),
     "copies": copies_table,
+    "published": published_table,
     "forces": lambda: crossed("forces", "name", "setting",
                               lambda r: arrow(r) + (f" ({r['substeps']})" if r["mode"] == "explicit" else "")),
     "meshes": lambda: crossed("meshes", lambda r: f"{r['mesh']}, {number(r['like'])} tets",

@@ -40,6 +40,7 @@ TEST_CASE("manners: words that are not known get the one that was meant") {
   refused("run --scene bunny-drp", "did you mean 'bunny-drop'?");
   refused("run --scene hard/nope", "hard/needle");
   refused("run --scene hard/twisted", "did you mean 'hard/twisted-720'?");
+  refused("run --scene published/sofa-bean", "did you mean 'published/sofa-beam'?");
   refused("run --mode cpu-fsat", "did you mean 'cpu-fast'?");
   refused("run --look wires", "did you mean 'wire'?");
   refused("run --solver substep", "did you mean 'substeps'?");

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "app/scene.h"
 #include "sim/contact/moving_obstacle.h"
@@ -256,8 +257,9 @@ TEST_CASE("every shipped scene runs in every mode") {
   for (const SolverMode& mode : pbd_modes()) runs[mode.name] = 0;
   for (const std::string& name : scene_names()) {
     CAPTURE(name);
+    if (name == "bowl-32" && !is_long_run()) continue;
     const auto model = build_model(load_scene(name));
-    // The long suite takes all pairs, the short one each scene in the mode that has had fewest.
+    // The long suite takes all pairs, the short one each scene but the largest in the mode that has had fewest.
     auto modes = pbd_modes();
     std::ranges::stable_sort(modes, {}, [&](const SolverMode& mode) { return runs.at(mode.name); });
     bool taken = false;
@@ -275,7 +277,7 @@ TEST_CASE("every shipped scene runs in every mode") {
       taken = true, ++runs.at(mode.name);
       const Scene scene = load_scene(name, {.parameters = {parameters.begin(), parameters.end()}});
       Sim sim = create_sim(model, scene.settings);
-      for (int s = 0; s < 4; ++s) step(sim);
+      for (int s = 0; s < (is_long_run() ? 4 : 2); ++s) step(sim);
       Metrics metrics = create_metrics(*model, sim.system);
       const Measurement m = measure_now(metrics, sim);
       CHECK(m.finite());
@@ -301,6 +303,20 @@ TEST_CASE("every hard case opens, and says what it is") {
     ++count;
   }
   CHECK(count >= 40);
+}
+
+TEST_CASE("scenes of other programs have their sizes, masses and stiffness") {
+  const auto check = [](const char* name, std::size_t tets, double mass, double young_modulus) {
+    CAPTURE(std::string(name));
+    const Scene scene = load_scene(std::string("published/") + name);
+    const auto model = build_model(scene);
+    CHECK(model->rest.tets.size() == tets);
+    CHECK(std::accumulate(model->masses.begin(), model->masses.end(), 0.0) == doctest::Approx(mass).epsilon(1e-3));
+    CHECK(material_of(scene.settings, scene.bodies.size() - 1).young_modulus == young_modulus);
+  };
+  check("sofa-beam", 39 * 9 * 9 * 6, 50, 2000);
+  check("sofa-beam-fine", 75 * 15 * 15 * 6, 50, 1000);
+  check("newton-beams", 4 * 12 * 4 * 4 * 6, 4 * 1000 * 1.2 * 0.4 * 0.4, 2.5e5);
 }
 
 TEST_CASE("a body as JSON reads back as the same body, and a setting that is no list takes none") {

@@ -193,16 +193,21 @@ def solver_table(name, scenes):
 
 def published_table():
     """Scenes of other programs: what these take by their own numbers, then what this one takes."""
-    lines, ours = [], data("published")["rows"]
-    for scene in dict.fromkeys(row["scene"] for row in data("elsewhere")["rows"]):
-        rows = [row for row in ours if row["scene"] == scene]
-        size = f", {number(rows[0]['tets'])} tets" if rows else ""
-        lines.append([f"**`published/{scene}`**{size}", "", "", ""])
-        lines += [[row["program"], row["machine"], ms(row), "–"] for row in data("elsewhere")["rows"] if row["scene"] == scene]
-        for row in rows:
-            error = percent(row["motion_final"], 2) if row["motion_final"] is not None else f"residual {percent(row['residual'], 2)}"
-            lines.append([f"`{row['mode']}`, {row['substeps']} × {row['iterations']}", "", ms(row), error])
-    return table(["scene, program, setting", "machine", "ms per step", "error"], lines) + "\n\n" + source("published")
+    lines, ours = [], data("published")
+    machine = re.sub(r" \(LLVM.*|/.*", "", ours["machine"]["gpu"])
+
+    def error(row):
+        return percent(row["residual"] if row["motion_final"] is None else row["motion_final"], 2)
+    for row in data("elsewhere")["rows"]:
+        found = [one for one in ours["rows"] if one["scene"] == row["scene"]]
+        size = f", {number(found[0]['tets'])} tets" if found else ""
+        lines += [[f"**`{row['scene']}`**{size}", "", "", ""], [row["program"], row["machine"], ms(row), "–"]]
+        for mode, substeps in dict.fromkeys((one["mode"], one["substeps"]) for one in found):
+            rows = [one for one in found if (one["mode"], one["substeps"]) == (mode, substeps)]
+            iterations = ", ".join(str(one["iterations"]) for one in rows)
+            lines.append([f"`{mode}`, {substeps} × {iterations}", machine, ", ".join(map(ms, rows)),
+                          ", ".join(map(error, rows))])
+    return table(["scene; program, substeps × iterations", "machine", "ms per step", "error"], lines) + "\n\n" + source("published")
 
 
 def copies_table():

@@ -123,7 +123,8 @@ void Video::close() {
   std::getline(std::ifstream(log_.part), said);
   // On a full disk ffmpeg 5.1 says so and still ends with 0.
   if (sent && status == 0 && said.empty()) return video_.finish();
-  const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
+  // What setsid ends with where there is no ffmpeg, or some folder of PATH cannot be read.
+  const bool missing = WIFEXITED(status) && (WEXITSTATUS(status) == 127 || WEXITSTATUS(status) == 126);
   throw Error("cannot write the video", video_.file.string(),
               missing ? "install ffmpeg" : "ffmpeg ended early" + (said.empty() ? "" : " (" + said + ")"), 1);
 }

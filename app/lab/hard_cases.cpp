@@ -76,6 +76,8 @@ void add_cases(Sweep& sweep, const CompareOptions& options) {
   if (names.empty())
     throw Error("no hard cases", (models_folder() / "scenes/hard").string(),
                 "point TETPBD_MODELS at the folder models/");
+  for (std::string& name : names)
+    if (name.starts_with("hard/")) name.erase(0, 5);  // as run has them
   std::ranges::sort(names);
   for (const std::string& name : names)
     for (const std::string& mesh : options.meshes) {

@@ -222,6 +222,11 @@ TEST_CASE("faults: ffmpeg that is missing, fails at once, or dies on the way") {
   const auto film = with(short_run, {"--out", "a", "--video", "'-q \"$(touch run)\nx.mp4", "--video-every", "1"});
   Program missing(folder, film, [] { ::setenv("PATH", "/nowhere", 1); });
   check_failed(missing, "install ffmpeg");
+  fs::create_directories(folder.path / "locked");
+  fs::create_symlink("/usr/bin/setsid", folder.path / "locked/setsid");
+  std::ofstream(folder.path / "locked/ffmpeg") << "nobody may run this";
+  Program locked(folder, film, [&] { ::setenv("PATH", (folder.path / "locked").c_str(), 1); });
+  check_failed(locked, "install ffmpeg");
   Program fails(folder, film, instead_of(folder, "ffmpeg", "echo no such codec >&2; exit 1\n"));
   check_failed(fails, "no such codec");
   Program dies(folder, film, instead_of(folder, "ffmpeg", "head -c 20000 >/dev/null; kill -9 $$\n"));

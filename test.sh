@@ -15,5 +15,5 @@ if [[ ${1:-} == --long ]]; then
   source tests/long_suite.sh
   run_long_suite "$@"
 else
-  exec ctest --preset ci -j"$(nproc)" "$@"
+  exec ctest --preset ci -j"$(($(nproc) + 1))" "$@"  # one more, because tests of the window mostly wait
 fi

@@ -83,7 +83,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
   CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.plan.substeps).epsilon(0.08));
 }
 
-TEST_CASE("auto takes the most accurate solver, and as many substeps as the budget holds") {
+TEST_CASE("auto takes the most accurate solver, and as many substeps as the budget holds (long)") {
   GlTest gl;
   for (const bool soft : {false, true}) {
     CAPTURE(soft);

@@ -138,7 +138,7 @@ TEST_CASE_FIXTURE(GlTest, "faces: a cloth lies over the edges of a box, not in i
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "faces: a block of one cell stands on a post that meets none of its vertices") {
+TEST_CASE_FIXTURE(GlTest, "faces: a block of one cell stands on a post that meets none of its vertices (long)") {
   for (const char* mode : {"explicit", "node", "newton", "cpu-double", "cpu-fast"}) {
     CAPTURE(std::string(mode));
     const auto model = block_on_post();

@@ -228,7 +228,7 @@ TEST_CASE_FIXTURE(
   CHECK(read_state(sim).positions == end.positions);
 }
 
-TEST_CASE_FIXTURE(GlTest, "hard bodies: on a soft one and under it, momentum is kept") {
+TEST_CASE_FIXTURE(GlTest, "hard bodies: on a soft one and under it, momentum is kept (long)") {
   for (const std::string& mode : all_modes) {
     CAPTURE(mode);
     Settings settings = weightless(hard(mode));

@@ -105,7 +105,7 @@ TEST_CASE("led: pulled against what is fixed, nothing passes through, not even t
     }
 }
 
-TEST_CASE("led: what is led from afar is seen in time, also where nothing else moves") {
+TEST_CASE("led: what is led from afar is seen in time, also where nothing else moves (long)") {
   GlTest gl;
   for (const char* mode : {"explicit", "node", "newton"}) {
     CAPTURE(std::string(mode));

@@ -341,7 +341,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as an edge at 50 m/s") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as an edge at 50 m/s (long)") {
   for (const std::string mode : {"node 20", "node 1", "explicit", "newton", "cpu", "cpu-fast", "constraint"}) {
     CAPTURE(mode);
     Setup setup;
@@ -484,7 +484,7 @@ TEST_CASE_FIXTURE(GlTest,
                        doctest::Contains("too many obstacles: 31 of them: at most 30 beside the ground"), Error);
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: others are taken over without new kernels where these would be the same") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: others are taken over without new kernels where these would be the same (long)") {
   for (const char* mode : {"node", "newton", "cpu-double", "cpu-fast"}) {
     CAPTURE(mode);
     Setup setup;

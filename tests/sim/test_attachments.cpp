@@ -117,7 +117,7 @@ TEST_CASE("attached halves sag alike in every mode, and keep the gap that they h
   }
 }
 
-TEST_CASE("attached bodies that fly and spin keep momentum and energy in every mode") {
+TEST_CASE("attached bodies that fly and spin keep momentum and energy in every mode (long)") {
   GlTest gl;
   for (const char* mode : {"node", "constraint", "cpu-double", "cpu-fast", "explicit", "newton", "vbd"}) {
     CAPTURE(mode);

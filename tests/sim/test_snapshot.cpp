@@ -98,7 +98,7 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
   }
 }
 
-TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of them") {
+TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of them (long)") {
   GlTest gl;
   Settings settings;
   settings.iterations = 4, settings.substeps = 1;

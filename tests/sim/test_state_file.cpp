@@ -34,7 +34,7 @@ Scene scene_of(const Folder& folder, const SolverMode& mode) {
 
 }  // namespace
 
-TEST_CASE("states: a run goes on from its file by the same bits, in every mode") {
+TEST_CASE("states: a run goes on from its file by the same bits, in every mode (long)") {
   const GlTest gl;
   const Folder folder;
   for (const SolverMode& mode : solver_modes()) {

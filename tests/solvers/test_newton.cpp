@@ -292,7 +292,7 @@ TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inve
   CHECK((found * coarse - Eigen::MatrixXd::Identity(Eigen::Index(unknowns), Eigen::Index(unknowns))).norm() < 1e-2);
 }
 
-TEST_CASE("newton: its motion nears that of leapfrog with the square of the step, damped or not") {
+TEST_CASE("newton: its motion nears that of leapfrog with the square of the step, damped or not (long)") {
   GlTest gl;
   for (const auto& [material, tau] :
        {std::pair{"none", 2e-3}, {"springs", 0.0}, {"neo-hookean", 2e-3}, {"smoothed", 0.0}}) {
@@ -500,7 +500,7 @@ TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no t
   CHECK(sim.adaptive.most_substeps == 1);
 }
 
-TEST_CASE("newton: a body that is pulled comes to where it rests in mode explicit, and lets go") {
+TEST_CASE("newton: a body that is pulled comes to where it rests in mode explicit, and lets go (long)") {
   GlTest gl;
   const auto model = deformed("none");
   const std::uint32_t held = 0, pulled = std::uint32_t(model->positions.size()) - 1;
@@ -525,7 +525,7 @@ TEST_CASE("newton: a body that is pulled comes to where it rests in mode explici
   CHECK(distance(ends[0], model->positions) > 0.02);
 }
 
-TEST_CASE("newton: with other steps or forces while running it is soon as if made for them") {
+TEST_CASE("newton: with other steps or forces while running it is soon as if made for them (long)") {
   GlTest gl;
   std::string material = "neo-hookean";
   SUBCASE("linear") {}

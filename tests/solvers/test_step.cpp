@@ -128,7 +128,7 @@ TEST_CASE("the float GPU solvers converge to the exact step as the double ones d
   }
 }
 
-TEST_CASE("a small body at rest beside one ten thousand times its size keeps as still as alone") {
+TEST_CASE("a small body at rest beside one ten thousand times its size keeps as still as alone (long)") {
   GlTest gl;
   const auto model_with = [](bool big) {
     auto model = std::make_shared<Model>();

@@ -1,9 +1,6 @@
 #!/usr/bin/env bash
 # Makes the pictures and films of the README in docs/figures, and those of the window's list of scenes beside these.
-# Usage: docs/figures.sh [PART...]: all parts, or those named (below). Needs ffmpeg and imagemagick; the window's
-# picture, lanes.png, is a screenshot of tetpbd view --scene soft-beam --material neo-hookean --young-modulus 1e6
-#   --lane mode=explicit --lane mode=newton,substeps=1,iterations=4 --lane mode=node,substeps=20,iterations=1
-#   --lane mode=node,substeps=5,iterations=1.
+# Usage: docs/figures.sh [PART...]: all parts, or those named (below). Needs ffmpeg and imagemagick.
 # TETPBD names the program, OUT where files go. An hour or so on a software renderer.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -73,7 +70,8 @@ hero() {
   shot 2 10 7 --scene press --set camera.target=[0,0.36,0] --set camera.distance=2.5 --set camera.azimuth=-15 --set camera.elevation=8
   shot 3 0 6 --scene twisted-beams --set camera.target=[0,1,0] --set camera.distance=3.2 --set camera.elevation=8
   shot 4 3 8 --scene gripper --set camera.target=[0,0.25,0] --set camera.distance=1.1 --set camera.azimuth=5 --set camera.elevation=8
-  ffmpeg -v error -y -framerate 25 -pattern_type glob -i "$out/hero/*.png" -c:v libwebp_anim -quality 55 -compression_level 4 -loop 0 "$into/hero.webp"
+  ffmpeg -v error -y -framerate 25 -pattern_type glob -i "$out/hero/*.png" -c:v libwebp_anim -quality 75 -compression_level 5 -loop 0 "$into/hero.webp"
+  jpeg "$(find "$out/hero" -name '1_*' | sort | sed -n 46p)" "$into/hero.jpg"
 }
 
 # One bunny of five stiffnesses, 75 ms after it has met the ground at 3.1 m/s.

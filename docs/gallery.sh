@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes docs/gallery: what each command line shows, as pictures with a page (README.md) around them.
 # Usage: docs/gallery.sh [NAME...]: all pictures (an hour or so on a software renderer), or those named; the page in any case.
-# TETPBD names the program, FOLDER where files go. Needs imagemagick.
+# Some have a clip of the same motion as well, which docs/index.html plays.
+# TETPBD names the program, FOLDER where files go. Needs imagemagick and ffmpeg.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$(realpath "${TETPBD:-build/release/tetpbd}") folder=${FOLDER:-docs/gallery} work=$(mktemp -d) wanted=" $* "
@@ -10,6 +11,7 @@ mkdir -p "$folder"
 page=$folder/README.md
 printf '# Gallery\n\nEach picture is the last frame of the command below it, with `--png-every`. Made by `docs/gallery.sh`.\n' >"$page"
 
+clips=' bunny bowl funnel press rollers spikes gripper balloon sewn-bag twisted-beams ring squishy-balls cards chain '
 show() {  # NAME STEPS TEXT OPTIONS...
   printf '\n## %s\n\n![%s](%s.jpg)\n\n```\ntetpbd run' "$3" "$3" "$1" >>"$page"
   for word in "${@:4}" --steps "$2"; do
@@ -18,8 +20,12 @@ show() {  # NAME STEPS TEXT OPTIONS...
   done
   printf '\n```\n' >>"$page"
   [[ $wanted == "  " || $wanted == *" $1 "* ]] || return 0
-  "$program" run "${@:4}" --steps "$2" --csv-every 0 --measure-every "$2" --png-every "$2" --size 640x480 --samples 8 --out "$work" >/dev/null
-  convert "$work/frame_$(printf %05d "$2").png" -strip -sampling-factor 1x1 -quality 88 "$folder/$1.jpg"
+  local every=$2
+  [[ $clips != *" $1 "* ]] || every=$((($2 + 23) / 24))
+  "$program" run "${@:4}" --steps "$2" --csv-every 0 --measure-every "$2" --png-every "$every" --size 640x480 --samples 8 --out "$work" >/dev/null
+  convert "$(find "$work" -name 'frame_*.png' | sort | tail -n 1)" -strip -sampling-factor 1x1 -quality 88 "$folder/$1.jpg"
+  [[ $every == "$2" ]] || ffmpeg -v error -y -framerate 12 -pattern_type glob -i "$work/frame_*.png" -vf scale=400:-1 \
+    -c:v libwebp_anim -quality 75 -compression_level 5 -loop 0 "$folder/$1.webp"
   rm "$work"/frame_*
 }
 look_at() {  # TARGET DISTANCE [AZIMUTH [ELEVATION]]: the camera, into `view`

@@ -53,12 +53,9 @@ def size(path):
 
 # ------------------------------------------------------------------------------------------------ what the page is made of
 def hero():
-    folder = docs / "figures"
-    film = next(f for name in ("hero.webp", "hero.gif", "lanes.gif") if (f := folder / name).exists())
-    still = next((f for name in ("hero.png", "lanes.png") if (f := folder / name).exists()), None)
-    width, height = size(film)
-    source = f'<source media="(prefers-reduced-motion: reduce)" srcset="figures/{still.name}">' if still else ""
-    return (f'<picture>{source}<img src="figures/{film.name}" width="{width}" height="{height}" '
+    width, height = size(docs / "figures/hero.webp")
+    return ('<picture><source media="(prefers-reduced-motion: reduce)" srcset="figures/hero.jpg">'
+            f'<img src="figures/hero.webp" width="{width}" height="{height}" '
             'alt="Soft bodies, simulated and drawn by tetpbd"></picture>')
 
 
@@ -107,7 +104,9 @@ def gallery():
         picture = re.search(r"!\[[^\]]*\]\(([^)\s]+)\)", section)
         command = re.search(r"^```\w*\n(.*?)\n```", section, re.S | re.M)
         if picture:
-            items.append(f'<figure><img src="gallery/{picture[1]}" loading="lazy" alt=""><figcaption>{esc(title, False)}'
+            film = (docs / "gallery" / picture[1]).with_suffix(".webp")
+            clip = f' data-clip="gallery/{film.name}" tabindex="0"' if film.exists() else ""
+            items.append(f'<figure><img src="gallery/{picture[1]}"{clip} loading="lazy" alt=""><figcaption>{esc(title, False)}'
                          + (f'<details><summary>command</summary><code class="cmd">{esc(command[1], False)}</code></details>' if command else "") + "</figcaption></figure>")
     return "\n".join(items)
 

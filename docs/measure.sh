@@ -79,6 +79,16 @@ published() {
   measure "$runs" run --scene published/vbd-ball --steps 20 --csv-every 0
 }
 
+# Implicit steps over stiffness and step: errors alone, which are those of any machine.
+stiffness() {
+  local scene=(--scene beam --set "bodies.0.block.cells=[8,3,3]" --material neo-hookean --modes newton --iterations 4 --substeps 1)
+  for dt in 0.001 0.005 0.05; do
+    for modulus in 1e4 1e5 1e6 1e7 1e8 1e9; do
+      measure 1 compare "${scene[@]}" --young-modulus $modulus --dt $dt --steps "$(awk -v dt=$dt 'BEGIN {print 0.4 / dt}')" --judge motion
+    done
+  done
+}
+
 copies() {
   for count in 1 8 64 512; do
     measure "$runs" run --scene jelly-beam --mode explicit --copies $count --steps 400 --measure-every 1000 --csv-every 0
@@ -86,7 +96,7 @@ copies() {
 }
 
 mkdir -p "$data"
-[[ $# -gt 0 ]] || set -- hard beam bunny rivals published copies
+[[ $# -gt 0 ]] || set -- hard beam bunny rivals published stiffness copies
 for part in "$@"; do
   [[ -e $data/$part.json ]] && continue
   mkdir -p "$work/$part"

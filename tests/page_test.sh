@@ -16,7 +16,7 @@ def anchors(page):
     if page.suffix == ".html":
         return set(re.findall(r'\sid="([^"]+)"', text))
     return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in re.findall(r"^#+ (.+?)\s*$", text, re.M)}
-for page, pattern in ("index.html", r'\s(?:href|src|srcset)="([^"]*)"'), ("scenes.md", r"\]\(([^)\s]+)\)"):
+for page, pattern in ("index.html", r'\s(?:href|src|srcset|data-clip)="([^"]*)"'), ("scenes.md", r"\]\(([^)\s]+)\)"):
     found = re.findall(pattern, re.sub(r"<script.*?</script>", "", (docs / page).read_text(), flags=re.S))
     for link in map(html.unescape, found):
         if link.startswith("data:"):

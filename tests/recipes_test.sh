@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# The commands of docs/guide.md, "Recipes", as they stand there.
-# Usage: recipes_test.sh PROGRAM GUIDE FOLDER
+# The commands of pages as they stand there, but those that open the window.
+# Usage: recipes_test.sh PROGRAM FOLDER PAGE...
 set -euo pipefail
-program=$(realpath "$1") guide=$(realpath "$2") here=$(dirname "$(realpath "$0")")
-rm -rf "$3" && mkdir -p "$3/bin" && cd "$3"
+program=$(realpath "$1") here=$(dirname "$(realpath "$0")")
+mapfile -t pages < <(realpath "${@:3}")
+rm -rf "$2" && mkdir -p "$2/bin" && cd "$2"
 ln -s "$program" bin/tetpbd
 export PATH=$PWD/bin:$PATH
 
@@ -13,7 +14,11 @@ export PATH=$PWD/bin:$PATH
 srun() { "$@"; }
 export SLURM_ARRAY_TASK_ID=2 PARALLEL_HOME=$PWD
 
-mapfile -t commands < <(awk '/^## / { recipes = /^## Recipes/ } /^```/ { fence = !fence; code = fence && $0 !~ /json/; next } recipes && code' "$guide")
+# Blocks without a language are commands, except those that a comment before them calls a file or a row.
+mapfile -t commands < <(awk '
+  /^<!-- (file|row): / { named = 1 }
+  /^```/ { fence = !fence; code = fence && $0 == "```" && !named; if (!fence) named = 0; next }
+  code && !/^tetpbd view/' "${pages[@]}")
 for command in "${commands[@]}"; do
   echo "$command"
   eval "$command"

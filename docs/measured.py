@@ -119,11 +119,16 @@ def ms(row):
     return number(cost[1] if isinstance(cost, list) else cost)
 
 
+def short_name(name):
+    """What a driver or the system calls a device, without versions and the like."""
+    return re.sub(r"/.*|\(R\)| Processor| \(LLVM.*", "", name)
+
+
 def source(name, *others):
     """On what, when and from what the numbers of a table come, as far as that is known."""
     parts = [data(one) for one in (name, *others)]
     part, machine = parts[0], parts[0]["machine"] or {}
-    gpu, cpu = (re.sub(r"/.*|\(R\)| Processor| \(LLVM.*", "", machine.get(key, "")) for key in ("gpu", "cpu"))
+    gpu, cpu = (short_name(machine.get(key, "")) for key in ("gpu", "cpu"))
     commits = " and ".join(dict.fromkeys(one["commit"] for one in parts if one["commit"]))
     runs = max(row.get("runs", 0) for row in part["rows"])
     dates = " and ".join(dict.fromkeys(row["date"] for row in part["rows"] if row["date"]))
@@ -194,7 +199,7 @@ def solver_table(name, scenes):
 def published_table():
     """Scenes of other programs: what these take by their own numbers, then what this one takes."""
     lines, ours = [], data("published")
-    machine = re.sub(r" \(LLVM.*|/.*", "", ours["machine"]["gpu"])
+    machine = short_name(ours["machine"]["gpu"])
 
     def error(row):
         return percent(row["residual"] if row["motion_final"] is None else row["motion_final"], 2)

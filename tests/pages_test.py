@@ -47,7 +47,8 @@ for page, text in texts.items():
         elif anchor and target.suffix == ".md" and anchor not in anchors(target.read_text()):
             failures.append(f"{name}: no heading {link}")
     failures += [f"{name}: '{phrase}'" for phrase in phrases if phrase in text and "generated" not in name.parts]
-words = {page: len(texts[page].split()) for page in counted}
+# Tables that docs/measured.py fills are not written by hand.
+words = {page: len(re.sub(r"<!-- data: .*?<!-- end -->", "", texts[page], flags=re.S).split()) for page in counted}
 if sum(words.values()) > most_words:
     failures.append(f"{sum(words.values())} words, at most {most_words}: " +
                     ", ".join(f"{page.name} {count}" for page, count in sorted(words.items(), key=lambda of: -of[1])))

@@ -208,7 +208,6 @@ void set_broken(Sim& sim, const std::vector<char>& broken) {
 
 void forget_all(Sim& sim) {
   static_cast<StepValues&>(sim) = {};
-  sim.substeps_done = 0;
   static_cast<PairNumbers&>(sim.pairs) = {};
 }
 

@@ -2,8 +2,10 @@
 // these functions and read the members, which only these functions write.
 //
 // In a program that uses GL itself, a simulation belongs to the context that is current when it is made, which has to
-// be current in each call and when it is destroyed. A call leaves the program in use, textures and the buffers of
-// generic targets bound as before (keep_bindings.h) and touches nothing else that drawing uses, such as vertex arrays.
+// be current in each call and when it is destroyed; a step may be taken in another one that shares its objects, if it
+// is not timed and the GPU has done what the first context queued. A call leaves the program in use, textures and the
+// buffers of generic targets bound as before (keep_bindings.h) and touches nothing else that drawing uses, such as
+// vertex arrays.
 //
 // Indexed buffers are not put back, because there are too many to ask for: calls bind uniform buffers 0 and 1, storage
 // buffers from 0 on and atomic counter buffer 0. When a simulation is destroyed, GL unbinds its buffers there, and Mesa
@@ -74,13 +76,11 @@ struct Sim : StepValues {
   Yielding yielding;  ///< where any body yields
   Tuning tuning;
   double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
-  int substeps_done = 0;            ///< of a step under way; 0: there is none
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
-  bool step_timed = false;  ///< that of the step under way
   Recorder recorder;
   GuardCounts guards{};       ///< since the last reset; ask guard_counts()
   FiniteCheck check;          ///< ask check_finite()
@@ -100,9 +100,11 @@ void apply_settings(Sim& sim, const Settings& settings);
 void rebuild_shaders(Sim& sim);
 /// Queues one step on the GPU (CPU modes: steps, then uploads). Does not wait.
 void step(Sim& sim);
-/// Begins a step, or goes on with the one under way, until it is whole or, between two substeps, `enough` says so; true
-/// once it is whole. While one is under way nothing but this, drawing and destroying is allowed. A CPU mode's is whole.
-bool step_until(Sim& sim, const std::function<bool()>& enough);
+/// The same, but for attachments that break. Ends between two substeps of a GPU mode where `given_up` says so, and is
+/// false then: the simulation can be reset or destroyed, nothing else.
+bool step_unless(Sim& sim, const std::function<bool()>& given_up);
+/// What a step ends with: lets go of attachments on which the force has become too large, which rebuilds the solver.
+void break_attachments(Sim& sim);
 /// Back to the model's start.
 void reset(Sim& sim);
 /// Goes on with these attachments alone let go of.

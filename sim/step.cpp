@@ -99,7 +99,6 @@ void begin_on_gpu(Sim& sim, bool moving) {
   activate(sim);
   plan_body_contacts(sim);
   bind_obstacles(sim.obstacles);
-  sim.step_timed = sim.timed;
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
   copy_rest_metrics(sim);
@@ -118,7 +117,8 @@ void move_rigid_bodies(Sim& sim) {
   sim.rigid_side = 1 - sim.rigid_side;
 }
 
-// Lets go of attachments on which the force has become too large.
+}  // namespace
+
 void break_attachments(Sim& sim) {
   std::vector<char> broken = sim.broken;
   State state;
@@ -134,10 +134,7 @@ void break_attachments(Sim& sim) {
   set_broken(sim, broken);
 }
 
-}  // namespace
-
-static void run_substep(Sim& sim, bool moving) {
-  const int k = sim.substeps_done++;
+static void run_substep(Sim& sim, int k, bool moving) {
   if (moving) bind_next_obstacles(sim);
   move_rigid_bodies(sim);
   aim_led(sim, k);
@@ -150,17 +147,18 @@ static void run_substep(Sim& sim, bool moving) {
 }
 
 static void end_step(Sim& sim) {
-  sim.substeps_done = 0;
   ++sim.steps;
   check_step(sim);
-  break_attachments(sim);
 }
 
 static void step_on_cpu(Sim& sim, bool moving) {
   sim.solver.prepare(sim);
   begin_leading(sim);
   activate(sim);
-  sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
+  {
+    const WithoutGl computing;
+    sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
+  }
   end_leading(sim);
   flow(sim);
   upload(sim, sim.host);
@@ -169,31 +167,26 @@ static void step_on_cpu(Sim& sim, bool moving) {
 }
 
 void step(Sim& sim) {
-  step_until(sim, [] { return false; });
+  step_unless(sim, [] { return false; });
+  break_attachments(sim);
 }
 
-bool step_until(Sim& sim, const std::function<bool()>& enough) {
+bool step_unless(Sim& sim, const std::function<bool()>& given_up) {
   const KeepBindings kept;  // a caller may use GL as well
   const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) return step_on_cpu(sim, moving), true;
-  if (sim.substeps_done == 0) {
-    sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
-    begin_on_gpu(sim, moving);
-    begin_leading(sim);
-  } else {
-    give_buffers(sim);
-    bind_obstacles(sim.obstacles);
-    if (sim.loads) bind_texels(UNIT_LOADS, sim.loads.texture);
-  }
-  while (sim.substeps_done < sim.plan.substeps) {
-    run_substep(sim, moving);
-    if (sim.substeps_done < sim.plan.substeps && enough()) return false;
+  sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
+  begin_on_gpu(sim, moving);
+  begin_leading(sim);
+  for (int k = 0; k < sim.plan.substeps; ++k) {
+    if (given_up()) return false;
+    run_substep(sim, k, moving);
   }
   end_leading(sim);
   flow(sim);
   // Vertex fetches and copies read the state next.
   sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  if (sim.step_timed) sim.timer.end();
+  if (sim.timed) sim.timer.end();
   end_step(sim);
   return true;
 }

@@ -66,7 +66,7 @@ void act(Session& s, const OpenState& a) {
   for (Lane& lane : s.loaded.lanes) all &= load_state(lane.sim, a.file);
   play(s, false);
   disturb(s), start_afresh(s), begin_timeline(s);
-  s.log("state of {}", s.loaded.sim().steps);
+  s.log("state of {}", s.loaded.lane().steps());
   say(s, fmt::format("{}: {}", a.file.filename().string(),
                      all ? "goes on from there" : "other settings, so positions and velocities alone"));
 }
@@ -74,7 +74,7 @@ void act(Session& s, const OpenState& a) {
 void act(Session& s, const GoBack&) {
   if (!restore_checkpoint(s.loaded.sim())) return say(s, "no good state is kept: reset (R)");
   start_afresh(s);
-  s.log("back {}", s.loaded.sim().steps);
+  s.log("back {}", s.loaded.lane().steps());
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -221,6 +221,8 @@ bool is_one_of(const Action& action) {
   return (std::holds_alternative<T>(action) || ...);
 }
 
+bool touches_lanes(const Action& action) { return !is_one_of<Lead, SetSpeed, SetView, SetCamera>(action); }
+
 Made what_is_made(const Session& s) {
   Made made{{}, s.loaded.scene.obstacles, {}};
   for (const Lane& lane : s.loaded.lanes) made.lanes.push_back(lane.sim.settings);
@@ -261,7 +263,9 @@ void bring_back(Session& s, const Made& from, const Made& to) {
     if (!std::ranges::count(to.pins, v)) perform(s, Unpin{v});
 }
 
-void take_back(Session& s, const char* word, std::vector<Change>& from, std::vector<Change>& to, bool forward) {
+void take_back(Session& s, const char* word, bool forward) {
+  auto& from = forward ? s.changes.future : s.changes.past;
+  auto& to = forward ? s.changes.past : s.changes.future;
   if (from.empty()) return say(s, fmt::format("nothing to {}", word));
   let_go(s);
   s.log("{}", word);
@@ -276,15 +280,16 @@ void take_back(Session& s, const char* word, std::vector<Change>& from, std::vec
 
 }  // namespace
 
-void undo(Session& s) { take_back(s, "undo", s.changes.past, s.changes.future, false); }
-void redo(Session& s) { take_back(s, "redo", s.changes.future, s.changes.past, true); }
+void undo(Session& s) {
+  between_steps(s, [&s] { take_back(s, "undo", false); });
+}
+void redo(Session& s) {
+  between_steps(s, [&s] { take_back(s, "redo", true); });
+}
 
 void perform(Session& s, const Action& action) {
+  if (touches_lanes(action)) finish_step(s);
   if (is_one_of<OpenScene, Reset, StartLanes, OpenState, GoBack, Go>(action)) let_go(s);
-  if (is_one_of<OpenScene, Reset>(action))
-    s.under_way.reset();  // what a step of seconds is worth is forgotten with the rest
-  else if (!is_one_of<Lead, SetSpeed, SetView, SetCamera>(action))
-    finish_step(s);
   note_moment(s);
   const auto line = line_of(s, action);
   const bool edits = is_one_of<StartLanes, Set, SetObstacles, Pin, Unpin>(action) && !s.changes.paused;
@@ -300,8 +305,18 @@ void perform(Session& s, const Action& action) {
   if (!is_one_of<Go>(action)) note_step(s);
 }
 
-bool emit(Session& s, const Action& action) {
-  return attempt(s, [&] { perform(s, action); });
+// A slider that is held says many times what shall be: of these the last counts.
+static bool replaces(const Action& next, const Action& last) {
+  if (const auto* set = std::get_if<Set>(&next))
+    return std::holds_alternative<Set>(last) && std::get<Set>(last).lane == set->lane;
+  return is_one_of<SetObstacles>(next) && is_one_of<SetObstacles>(last);
+}
+
+void emit(Session& s, const Action& action) {
+  if (!s.under_way || !touches_lanes(action)) return void(attempt(s, [&] { perform(s, action); }));
+  if (is_one_of<Reset>(action) && s.waiting.empty()) give_up_step(s);
+  if (!s.waiting.empty() && s.waiting.back().action && replaces(action, *s.waiting.back().action)) s.waiting.pop_back();
+  s.waiting.push_back({[&s, action] { perform(s, action); }, action});
 }
 
 }  // namespace tetpbd

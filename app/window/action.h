@@ -84,8 +84,8 @@ using Action = std::variant<action::OpenScene, action::StartLanes, action::Set, 
 /// Ends the step under way, does it, writes it to the record and keeps it for undo. Throws what goes wrong; then
 /// settings and obstacles are as before.
 void perform(Session& session, const Action& action);
-/// The same; what goes wrong becomes a message. Whether it went well.
-bool emit(Session& session, const Action& action);
+/// The same, once the step under way has ended if the action needs that; what goes wrong becomes a message.
+void emit(Session& session, const Action& action);
 
 /// What the user made, which undo brings back.
 struct Made {

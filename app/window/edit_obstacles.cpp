@@ -15,10 +15,12 @@ void choose_obstacle(Session& s, int number) {
   if (std::exchange(s.obstacle, number) != number) s.log("obstacle {} chosen", number + 1);
 }
 
-void add_obstacle(Session& s, const ObstacleKind& kind) {
+namespace {
+
+// Beside the bodies, as the camera sees them.
+Obstacle new_obstacle(const Session& s, const ObstacleKind& kind, double size) {
   Obstacle o;
   o.kind = &kind;
-  const double size = 0.2 * s.loaded.sim().model->size;
   o.normal = {0, 1, 0};
   o.radius = kind.has("half_length") ? 0.5 * size : size;
   o.half_length = size;
@@ -35,25 +37,35 @@ void add_obstacle(Session& s, const ObstacleKind& kind) {
   o.centre = glm::dvec3(s.camera.target) +
              (kind.has("heights") ? 5 : 3) * size * glm::dvec3(std::sin(angle), 0, std::cos(angle));
   if (world.ground) o.centre.y = world.ground_height + (kind.half ? kind.half(o).y : 0);
-  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
-  wanted.push_back(std::move(o));
-  const std::size_t count = wanted.size();
-  change_obstacles(s, std::move(wanted));
-  if (s.loaded.scene.obstacles.size() != count) return;
-  choose_obstacle(s, int(count) - 1);
-  // It is to be seen whole, or nobody knows that it is there.
-  const glm::mat4 seen = projection_matrix(s.camera, s.aspect) * view_matrix(s.camera);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : 0, corner & 4 ? 1 : -1);
-    const glm::vec4 at = seen * glm::vec4(glm::vec3(s.loaded.scene.obstacles.back().centre) + float(size) * side, 1);
-    if (at.w <= 0 || std::max(std::abs(at.x), std::abs(at.y)) > at.w) return frame_body(s);
-  }
+  return o;
+}
+
+}  // namespace
+
+void add_obstacle(Session& s, const ObstacleKind& kind) {
+  between_steps(s, [&s, &kind] {
+    const double size = 0.2 * s.loaded.model->size;
+    std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+    wanted.push_back(new_obstacle(s, kind, size));
+    const std::size_t count = wanted.size();
+    change_obstacles(s, std::move(wanted));
+    if (s.loaded.scene.obstacles.size() != count) return;
+    choose_obstacle(s, int(count) - 1);
+    // It is to be seen whole, or nobody knows that it is there.
+    const glm::mat4 seen = projection_matrix(s.camera, s.aspect) * view_matrix(s.camera);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : 0, corner & 4 ? 1 : -1);
+      const glm::vec4 at = seen * glm::vec4(glm::vec3(s.loaded.scene.obstacles.back().centre) + float(size) * side, 1);
+      if (at.w <= 0 || std::max(std::abs(at.x), std::abs(at.y)) > at.w) return frame_body(s);
+    }
+  });
 }
 
 void remove_obstacle(Session& s) {
   if (s.obstacle < 0) return;
-  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  std::vector<Obstacle> wanted = asked_obstacles(s);
   wanted.erase(wanted.begin() + s.obstacle);
+  s.obstacle = -1;
   change_obstacles(s, std::move(wanted));
 }
 
@@ -75,7 +87,7 @@ void turn_by(Obstacle& o, const glm::dmat3& turn) {
 namespace {
 
 glm::dvec3 chosen_centre(const Session& s) {
-  return pose_at(s.loaded.scene.obstacles[std::size_t(s.obstacle)], simulated_time(s.loaded.sim())).centre;
+  return pose_at(asked_obstacles(s)[std::size_t(s.obstacle)], s.loaded.lane().time()).centre;
 }
 
 // On the screen, of the arrow along an axis.
@@ -124,7 +136,7 @@ std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
   const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));
   const auto& all = s.loaded.scene.obstacles;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const MovingObstacle obstacle = moving_obstacle(all[i], simulated_time(s.loaded.sim()), 0);
+    const MovingObstacle obstacle = moving_obstacle(all[i], s.loaded.lane().time(), 0);
     double t = 0, gap = 0;
     for (int turn = 0; turn < 400 && t < far; ++turn) {
       gap = obstacle.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;

@@ -29,7 +29,7 @@ constexpr double edges_at_most = 2.5;
 constexpr double edges_ahead = 4;
 
 // Takes in the watched positions that have come back, and asks for the next.
-void watch(Grab& grab, const Sim& sim, bool wait = false) {
+void watch(Grab& grab, const Buffer& positions, bool wait = false) {
   if (const auto copy = poll_readback<Position>(grab.copied, grab.copy, "reading a vertex", wait)) {
     grab.neighbours = glm::dvec3(0);
     for (const Position& p : *copy) {
@@ -41,7 +41,7 @@ void watch(Grab& grab, const Sim& sim, bool wait = false) {
   }
   if (grab.copied) return;
   for (std::size_t i = 0; i < grab.watched.size(); ++i)
-    sim.positions.copy_to(grab.copy, i * sizeof(Position), grab.watched[i] * sizeof(Position), sizeof(Position));
+    positions.copy_to(grab.copy, i * sizeof(Position), grab.watched[i] * sizeof(Position), sizeof(Position));
   grab.copied = Fence::here();
 }
 
@@ -139,21 +139,21 @@ Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {
   if (grab.watched.empty()) grab.watched.push_back(hold.vertices.back());  // all of the body is held
   grab.watched.push_back(hold.caught());
   grab.copy = Buffer("watched positions", grab.watched.size() * sizeof(Position), nullptr, GL_STREAM_READ);
-  watch(grab, sim);
-  watch(grab, sim, true);
+  watch(grab, sim.positions);
+  watch(grab, sim.positions, true);
   grab.start = grab.position = grab.seen;
   grab.resting = grab.seen - grab.neighbours;
   return grab;
 }
 
-void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor) {
-  watch(grab, sim);
+void aim(Grab& grab, const Lane& lane, const Camera& camera, const Ray& cursor) {
+  watch(grab, lane.positions());
   const glm::dvec3 forward(camera.target - eye(camera)), origin(cursor.origin), along(cursor.direction);
   // At the depth of the hit, and as far beside the cursor as the vertex was: catching it moves nothing.
   const double reach = glm::dot(grab.hit - origin, forward) / glm::dot(along, forward);
   grab.target = origin + along * reach + grab.start - grab.hit;
   // A pinned vertex has no contact with obstacles, so it is kept out of them here.
-  grab.target = out_of_obstacles(*sim.model, sim.settings, simulated_time(sim), grab.target);
+  grab.target = out_of_obstacles(*lane.sim.model, lane.sim.settings, lane.time(), grab.target);
 }
 
 void lead(Grab& grab) {

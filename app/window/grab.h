@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "app/window/lanes.h"
 #include "render/camera.h"
 #include "render/picking.h"
 #include "sim/sim.h"
@@ -45,7 +46,7 @@ struct Grab {
 /// Waits for the GPU.
 Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick);
 /// Takes in what has been read back, and aims at the point under the cursor at the depth of the hit.
-void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor);
+void aim(Grab& grab, const Lane& lane, const Camera& camera, const Ray& cursor);
 /// Before each step: where it goes next.
 void lead(Grab& grab);
 

@@ -60,7 +60,7 @@ void drag_obstacle(Input& in, const Ray& before, float dx, float dy) {
     const glm::dvec3 along(ray.direction);
     return glm::dvec3(ray.origin) + along * (in.depth / glm::dot(along, forward));
   };
-  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  std::vector<Obstacle> wanted = asked_obstacles(s);
   Obstacle& o = wanted[std::size_t(s.obstacle)];
   if (in.axis) {
     glm::dvec3 way(0);
@@ -136,7 +136,7 @@ void release(Input& in, int button) {
   // A press that the picker has not answered yet is a click: it may still pin a vertex, but catches none.
   if (in.drag == Drag::grab) let_go(s);
   if (in.drag == Drag::obstacle) {
-    const glm::dvec3& at = s.loaded.scene.obstacles[std::size_t(s.obstacle)].centre;
+    const glm::dvec3& at = asked_obstacles(s)[std::size_t(s.obstacle)].centre;
     s.log("obstacle {} at {:.3f} {:.3f} {:.3f}", s.obstacle + 1, at.x, at.y, at.z);
     s.moving_obstacle = false;
   }
@@ -182,16 +182,22 @@ bool take_obstacle(Input& in, const Pick& pick) {
   return true;
 }
 
+// Pins what a double click met, or catches it if the button is still down.
+void take_vertex(Input& in, const Pick& pick, bool pinning) {
+  Session& s = in.session;
+  if (pinning) return toggle_pin(s, pick.vertex);
+  if (in.drag != Drag::asking) return;
+  catch_vertex(s, pick);
+  in.drag = s.grab ? Drag::grab : Drag::orbit;
+}
+
 void take_answer(Input& in) {
   Session& s = in.session;
   const auto pick = poll(s.loaded.picker);
   if (!pick) return;
   const bool pinning = std::exchange(in.pinning, false);
   if (take_obstacle(in, *pick)) return;
-  if (pinning) return toggle_pin(s, pick->vertex);
-  if (in.drag != Drag::asking) return;
-  catch_vertex(s, *pick);
-  in.drag = s.grab ? Drag::grab : Drag::orbit;
+  between_steps(s, [&in, pick = *pick, pinning] { take_vertex(in, pick, pinning); });
 }
 
 // Asks what is under a cursor that has come to rest, and again when the picture there may have changed.
@@ -210,7 +216,7 @@ void hover(Input& in) {
           probe.reading->position.y, probe.reading->position.z);
   const std::size_t lane = lane_at_cursor(in);
   const Ray ray = ray_at_cursor(in, lane);
-  const Seen now{ray.origin, ray.direction, s.loaded.sim().steps, s.loaded.held, lane};
+  const Seen now{ray.origin, ray.direction, s.loaded.lane().steps(), s.loaded.held, lane};
   if (probe.asked() || in.seen == now) return;
   in.seen = now;
   ask(probe, s.loaded.lanes, lane, s.loaded.renderer, shown_frame(s, lane), ray);
@@ -325,8 +331,7 @@ void handle_input(Input& in, const Rect& view) {
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (in.drag == Drag::obstacle && s.obstacle < 0) in.drag = Drag::none, s.moving_obstacle = false;
   if (!s.grab) return;
-  const Sim& sim = s.loaded.sim();
-  aim(*s.grab, sim, s.camera, ray_at_cursor(in));
+  aim(*s.grab, s.loaded.lane(), s.camera, ray_at_cursor(in));
 }
 
 }  // namespace tetpbd

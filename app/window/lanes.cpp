@@ -22,9 +22,9 @@ namespace {
 long compared_every(const Model& model) { return std::max(4l, long(model.positions.size() / 1000)); }
 
 // How far its iterations go, about.
-double effort(const Sim& sim) {
-  return solver_mode(sim.settings).leapfrog ? 1e9 / sim.settings.stability
-                                            : double(sim.plan.iterations) * sim.plan.substeps;
+double effort(const Lane& lane) {
+  const Settings& s = lane.sim.settings;
+  return solver_mode(s).leapfrog ? 1e9 / s.stability : double(lane.plan().iterations) * lane.plan().substeps;
 }
 
 GLuint patch_words(const Sim& sim) {
@@ -35,18 +35,45 @@ GLuint patch_words(const Sim& sim) {
 
 }  // namespace
 
+void keep_shown(Lane& lane, const ViewOptions& view) {
+  const auto copy = [](const Buffer& from, Buffer& to) {
+    if (to.bytes() != from.bytes()) to = Buffer("shown " + from.label(), from.bytes());
+    from.copy_to(to, 0, 0, from.bytes());
+  };
+  const Sim& sim = lane.sim;
+  copy(sim.positions, lane.shown_positions), copy(sim.velocities, lane.shown_velocities);
+  lane.shown = {make_frame(sim, {}, view, {}), sim.steps, simulated_time(sim), sim.plan, sim.adaptive, sim.check.found};
+  lane.shown->frame.positions = lane.shown_positions.id(), lane.shown->frame.velocities = lane.shown_velocities.id();
+}
+
+Frame frame_of(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target) {
+  if (!lane.shown) return make_frame(lane.sim, camera, view, target);
+  Frame frame = lane.shown->frame;
+  frame.camera = camera, frame.options = view;
+  frame.viewport = {0, 0, target.width, target.height};
+  frame.target = target.framebuffer.id();
+  return frame;
+}
+
+std::vector<glm::dvec3> positions_of(const Lane& lane) {
+  std::vector<glm::dvec3> positions;
+  for (const Position& p : lane.positions().read_all<Position>())
+    positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
+  return positions;
+}
+
 std::string describe(const Lane& lane, bool material) {
   const Settings& s = lane.sim.settings;
   std::string text = s.mode;
   const auto add = [&](int count, const char* what) {
     if (count != 1) text += fmt::format(", {} {}s", count, what);
   };
-  add(lane.sim.plan.substeps, "substep");
-  add(lane.sim.plan.iterations, "iteration");
+  add(lane.plan().substeps, "substep");
+  add(lane.plan().iterations, "iteration");
   if (material && s.material != "none" && !has_own_materials(s))
     text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
   if (solver_mode(s).smoothed && any_material(s, smoothed)) text += ", smoothed";
-  if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
+  if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.found()->step);
   return text;
 }
 
@@ -133,6 +160,9 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
                        const std::shared_ptr<const Model>& model, std::size_t bodies) {
   double budget_ms = 0;
   const std::size_t count = model ? model->bodies.size() : std::max(bodies, settings.bodies.size());
+  std::vector<std::string> names = preset_names(solver_presets());
+  for (const SolverMode& mode : solver_modes())
+    if (!std::ranges::count(names, mode.name)) names.push_back(mode.name);
   for (const std::string& word : split(words, ',')) {
     if (const std::string budget = "budget_ms="; word.starts_with(budget)) {
       char* end = nullptr;
@@ -148,11 +178,14 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
       throw Error(fmt::format("{} is that of all lanes", row->name), where, "give it as a flag or in the scene");
     if (equals != std::string::npos)
       assign(settings, word.substr(0, equals), word.substr(equals + 1), where, count);
-    else if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
+    else if (apply_preset(settings, solver_presets(), word) || apply_preset(settings, material_presets(), word))
+      continue;
+    else if (std::ranges::count(names, word))
+      assign(settings, "mode", word, where, count);
+    else
       throw Error(fmt::format("'{}' is no solver", word), where,
-                  did_you_mean(word, preset_names(solver_presets())) +
-                      fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
-                                  fmt::join(preset_names(solver_presets()), ", ")));
+                  did_you_mean(word, names) + fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
+                                                          fmt::join(names, ", ")));
   }
   check_settings(settings, where);
   if (budget_ms > 0 && model) settings = choose_solver(model, settings, budget_ms, 400).settings();
@@ -161,12 +194,12 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
 
 long steps_of(const std::vector<Lane>& lanes) {
   long steps = 0;
-  for (const Lane& lane : lanes) steps = std::max(steps, lane.sim.steps);
+  for (const Lane& lane : lanes) steps = std::max(steps, lane.steps());
   return steps;
 }
 
 std::size_t yardstick(const std::vector<Lane>& lanes) {
-  const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim); };
+  const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane); };
   return std::size_t(std::ranges::max_element(lanes, {}, worth) - lanes.begin());
 }
 
@@ -193,9 +226,9 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
     answer = read_state(lanes[yardstick(lanes)].sim);
   }
   for (Lane& lane : lanes) {
-    if (lane.stopped() || lane.sim.steps != now) continue;
+    if (lane.stopped() || lane.steps() != now) continue;
     const double distance = error_to(model, answer, read_state(lane.sim));
-    if (std::isfinite(distance)) lane.distance.add(100 * distance, simulated_time(lane.sim));
+    if (std::isfinite(distance)) lane.distance.add(100 * distance, lane.time());
   }
 }
 
@@ -215,10 +248,10 @@ bool send_answers(const Motion& right, long step, Buffer& answers) {
 void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers) {
   const long now = steps_of(lanes);
   if (right && !send_answers(*right, now, answers)) return;
-  const Buffer& answer = right ? answers : lanes[yardstick(lanes)].sim.positions;
+  const Buffer& answer = right ? answers : lanes[yardstick(lanes)].positions();
   for (Lane& lane : lanes)
-    if (!lane.stopped() && lane.sim.steps == now)
-      measure_distances(renderer, lane.sim.positions.id(), answer.id(), lane.sim.model->size, lane.apart);
+    if (!lane.stopped() && lane.steps() == now)
+      measure_distances(renderer, lane.positions().id(), answer.id(), lane.sim.model->size, lane.apart);
 }
 
 }  // namespace tetpbd

@@ -26,8 +26,20 @@ struct History {
   std::optional<float> at(double time) const;  ///< the last value until then
 };
 
+/// What is seen of a lane while the stepping thread has its simulation: how it was when that step began.
+struct Shown {
+  Frame frame;  ///< of buffers of the lane's own
+  long steps = 0;
+  double time = 0;  ///< s
+  Plan plan;
+  AdaptiveValues adaptive;
+  std::optional<NonFinite> found;
+};
+
 struct Lane {
-  Sim sim;
+  Sim sim;  ///< while `shown`, nobody but the stepping thread may use what a step changes of it
+  std::optional<Shown> shown{};
+  Buffer shown_positions{}, shown_velocities{};
   std::optional<Metrics> metrics{};             ///< made when first shown
   History step_ms{}, volume_error{}, energy{};  ///< J, with the elastic one of a material
   History distance{};                           ///< from what is right, % of the size
@@ -38,10 +50,24 @@ struct Lane {
   Buffer apart{};    ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                      ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
-  std::optional<float> far() const { return distance.at(simulated_time(sim)); }  ///< now
+  const Buffer& positions() const { return shown ? shown_positions : sim.positions; }
+  const Buffer& velocities() const { return shown ? shown_velocities : sim.velocities; }
+  long steps() const { return shown ? shown->steps : sim.steps; }
+  double time() const { return shown ? shown->time : simulated_time(sim); }
+  const Plan& plan() const { return shown ? shown->plan : sim.plan; }
+  const AdaptiveValues& adaptive() const { return shown ? shown->adaptive : sim.adaptive; }
+  const std::optional<NonFinite>& found() const { return shown ? shown->found : sim.check.found; }
+  std::optional<float> far() const { return distance.at(time()); }  ///< now
   /// Steps no more, since its state is not finite, while others go on.
-  bool stopped() const { return sim.check.found.has_value(); }
+  bool stopped() const { return found().has_value(); }
 };
+
+/// Before the thread steps it: keeps what is seen of it. `view`: what the picture shows.
+void keep_shown(Lane& lane, const ViewOptions& view);
+/// A picture of it, as make_frame() makes of a simulation.
+Frame frame_of(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target);
+/// m, by vertex, as seen. Waits for the GPU.
+std::vector<glm::dvec3> positions_of(const Lane& lane);
 
 /// Lanes of one key have one reference motion. Reads the whole mesh.
 std::uint64_t motion_key(const Lane& lane);

@@ -97,12 +97,12 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
 // Beside the number stands whether the mode or the material decides it; then the number shows what it decided.
 template <class T>
 void automatic_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
-  const Plan& plan = s.loaded.sim().plan;
+  const Plan& plan = s.loaded.lane().plan();
   const T decided = row.name == "iterations" ? T(plan.iterations)
                     : row.name == "substeps" ? T(plan.substeps)
                     : row.name == "contact_distance"
                         ? T(Surfaces::offset_part * s.loaded.sim().pairs.edge)
-                        : T(smoothing_of(settings_for_body(s.loaded.sim().settings, s.loaded.body)));
+                        : T(smoothing_of(settings_for_body(asked_settings(s), s.loaded.body)));
   const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
                     ImGui::GetStyle().ItemSpacing.x;
   T shown = value == automatic ? decided : value;
@@ -167,10 +167,10 @@ bool names(const std::string& pattern, const std::string& name) {
 }
 
 // What the panel shows is of all bodies or of the chosen one.
-Settings shown_settings(const Session& s) { return settings_for_body(s.loaded.sim().settings, s.loaded.body); }
+Settings shown_settings(const Session& s) { return settings_for_body(asked_settings(s), s.loaded.body); }
 void change_shown(Session& s, const Settings& wanted) {
   if (!s.loaded.body) return change_settings(s, wanted);
-  change_settings(s, with_body_changed(s.loaded.sim().settings, wanted, *s.loaded.body, s.loaded.model->bodies.size()));
+  change_settings(s, with_body_changed(asked_settings(s), wanted, *s.loaded.body, s.loaded.model->bodies.size()));
 }
 
 void draw_settings(Session& s, const Group& group) {
@@ -222,7 +222,7 @@ Ways ways_of(const Settings& now, const std::vector<Preset>& presets, const std:
 
 // The whole way to solve by one word, and what auto picked.
 void draw_solver(Session& s) {
-  const Settings now = s.loaded.sim().settings;
+  const Settings now = asked_settings(s);
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
   Ways ways = ways_of(
@@ -234,10 +234,10 @@ void draw_solver(Session& s) {
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
-  const AdaptiveSubsteps& watch = s.loaded.sim().adaptive;
+  const AdaptiveValues& watch = s.loaded.lane().adaptive();
   if (solver_mode(now).leapfrog)
     ImGui::TextWrapped(
-        "%d substeps%s", s.loaded.sim().plan.substeps,
+        "%d substeps%s", s.loaded.lane().plan().substeps,
         watch.stiffening > 1 ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str() : "");
   if (solver_mode(now).implicit)
     ImGui::TextWrapped(
@@ -370,10 +370,10 @@ void draw_timeline(Session& s) {
   ImGui::SetNextItemWidth(-1);
   const long first = t.moments.empty() ? 0 : t.moments.front()->step;
   long now = steps_of(s.loaded.lanes), last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
-  std::string text = t.moments.empty() ? "nothing is stored" : fmt::format("{:.3f} s", simulated_time(s.loaded.sim()));
+  std::string text = t.moments.empty() ? "nothing is stored" : fmt::format("{:.3f} s", s.loaded.lane().time());
   if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
     text += fmt::format(" of {:.3f} .. {:.3f} s", t.moments.front()->time,
-                        std::max(t.moments.back()->time, simulated_time(s.loaded.sim())));
+                        std::max(t.moments.back()->time, s.loaded.lane().time()));
   if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
                           ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
     show_step(s, now);

@@ -158,8 +158,7 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
     const float y = corner.y + size.y * float(1 - (decade - axes.low) / (axes.high - axes.low));
     draw.AddLine(ImVec2(corner.x, y), ImVec2(end.x, y), faint);
   }
-  if (const double now = simulated_time(s.loaded.sim());
-      row.of && !row.over_cost && now < axes.right) {  // back in time
+  if (const double now = s.loaded.lane().time(); row.of && !row.over_cost && now < axes.right) {  // back in time
     const float x = corner.x + size.x * float((now - axes.left) / (axes.right - axes.left));
     draw.AddLine(ImVec2(x, corner.y), ImVec2(x, end.y), ImGui::GetColorU32(ImGuiCol_Text, 0.4f));
   }
@@ -265,7 +264,7 @@ std::string plot_csv(const Session& s, const PlotRow& row) {
 Chart plot_chart(const Session& s, const PlotRow& row) {
   Chart chart{.title = s.loaded.scene.name + ": " + title_of(s, row),
               .subtitle = fmt::format("{} tets, {} steps to {:g} s", s.loaded.sim().model->rest.tets.size(),
-                                      s.loaded.sim().steps, simulated_time(s.loaded.sim())),
+                                      s.loaded.lane().steps(), s.loaded.lane().time()),
               .x_label = row.over_cost ? "time per step, ms" : "time, s",
               .y_label = fmt::format("{}, {}", title_of(s, row), row.unit)};
   chart.log_x = row.over_cost;

@@ -42,8 +42,8 @@ void copy_values(Probe& probe, const Lane& lane) {
   const std::size_t bytes = (distance_at(probe) + 1) * 4;
   if (!probe.copy || probe.copy.bytes() < bytes) probe.copy = Buffer("probe", bytes, nullptr, GL_STREAM_READ);
   for (std::size_t i = 0; i < probe.read.size(); ++i)
-    lane.sim.positions.copy_to(probe.copy, i * sizeof(Position), probe.read[i] * sizeof(Position), sizeof(Position));
-  lane.sim.velocities.copy_to(probe.copy, velocity_at(probe) * 4, vertex * sizeof(Velocity), sizeof(Velocity));
+    lane.positions().copy_to(probe.copy, i * sizeof(Position), probe.read[i] * sizeof(Position), sizeof(Position));
+  lane.velocities().copy_to(probe.copy, velocity_at(probe) * 4, vertex * sizeof(Velocity), sizeof(Velocity));
   if (lane.apart) lane.apart.copy_to(probe.copy, distance_at(probe) * 4, vertex * 4, 4);
   probe.copied = Fence::here();
 }

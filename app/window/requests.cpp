@@ -22,7 +22,7 @@ bool is_fixed(Session& s, std::uint32_t vertex) {
 
 std::vector<Settings> settings_of_lanes(const Session& s) {
   std::vector<Settings> all;
-  for (const Lane& lane : s.loaded.lanes) all.push_back(lane.sim.settings);
+  for (std::size_t lane = 0; lane < s.loaded.lanes.size(); ++lane) all.push_back(asked_settings(s, lane));
   return all;
 }
 
@@ -39,7 +39,7 @@ std::string words_of_next_lane(const Session& s) {
 }  // namespace
 
 void restart(Session& s) {
-  const Settings &made = s.loaded.scene.settings, &now = s.loaded.sim().settings;
+  const Settings &made = s.loaded.scene.settings, &now = asked_settings(s);
   const auto made_with_another = [&](const Parameter& row) {
     return row.effect == Effect::restart && parameter_text(made, row) != parameter_text(now, row);
   };
@@ -50,8 +50,7 @@ void restart(Session& s) {
 }
 
 void go_back(Session& s) {
-  attempt(s, [&] {
-    finish_step(s);
+  between_steps(s, [&s] {
     let_go(s);
     if (!check_finite(s.loaded.sim(), true)) return say(s, "the state is finite again");
     perform(s, action::GoBack{});
@@ -68,7 +67,7 @@ int halvings_for(double speed) {
 }
 
 void change_settings(Session& s, const Settings& wanted) {
-  const Settings& now = s.loaded.sim().settings;
+  const Settings& now = asked_settings(s);
   // Nothing ends a step early, so a slider does not go where one takes minutes.
   constexpr long most = 10000;
   const auto passes = [](const Settings& settings) {
@@ -96,7 +95,7 @@ void choose_body_at_cursor(Session& s) {
 }
 
 void add_lane(Session& s, const std::string& wanted) {
-  attempt(s, [&] {
+  between_steps(s, [&s, wanted] {
     if (s.loaded.lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
     const Sim& own = s.loaded.sim();
     const std::string words = wanted.empty() ? words_of_next_lane(s) : wanted;
@@ -110,14 +109,16 @@ void add_lane(Session& s, const std::string& wanted) {
 }
 
 void remove_lane(Session& s, std::size_t lane) {
-  std::vector<Settings> lanes = settings_of_lanes(s);
-  if (lanes.size() == 1) return;
-  lanes.erase(lanes.begin() + std::ptrdiff_t(lane));
-  emit(s, action::StartLanes{lanes});
+  between_steps(s, [&s, lane] {
+    std::vector<Settings> lanes = settings_of_lanes(s);
+    if (lanes.size() == 1 || lane >= lanes.size()) return;
+    lanes.erase(lanes.begin() + std::ptrdiff_t(lane));
+    emit(s, action::StartLanes{lanes});
+  });
 }
 
 void compare_lanes(Session& s, const std::vector<std::string>& words) {
-  attempt(s, [&] {
+  between_steps(s, [&s, words] {
     action::StartLanes start;
     for (const std::string& own : words)
       start.lanes.push_back(lane_settings(s.loaded.scene.settings, own, "--lane " + own, s.loaded.model));
@@ -151,7 +152,9 @@ void catch_vertex(Session& s, const Pick& pick) {
 }
 
 void let_go(Session& s) {
-  if (s.hold) perform(s, action::Release{});
+  between_steps(s, [&s] {
+    if (s.hold) perform(s, action::Release{});
+  });
 }
 
 void choose_soon(Session& s) {

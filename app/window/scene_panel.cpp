@@ -108,7 +108,7 @@ bool own_or_worlds(Session& s, const char* label, std::optional<double>& own, do
 }
 
 bool obstacle_fields(Session& s, Obstacle& o) {
-  const Settings& world = s.loaded.sim().settings;
+  const Settings& world = asked_settings(s);
   const double step = 0.005 * s.loaded.sim().model->size, least = 1e-3 * s.loaded.sim().model->size;
   const ObstacleKind& kind = *o.kind;
   bool changed = false, others = false;
@@ -197,7 +197,7 @@ void draw_obstacles(Session& s) {
   }
   if (s.obstacle < 0) return;
   ImGui::PushID("obstacle");
-  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  std::vector<Obstacle> wanted = asked_obstacles(s);
   if (obstacle_fields(s, wanted[std::size_t(s.obstacle)])) change_obstacles(s, std::move(wanted));
   if (button(s, "Remove", "remove obstacle", "the chosen obstacle goes\nDelete", -1)) remove_obstacle(s);
   ImGui::PopID();

@@ -103,7 +103,6 @@ bool attempt(Session& s, const std::function<void()>& action) {
 
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset(), s.hold.reset();
-  s.under_way.reset();
   s.step_seconds = 0;
   s.changes = {};
   s.obstacle = -1;
@@ -139,8 +138,7 @@ std::string file_stem(std::string name) {
 }  // namespace
 
 void save_state_file(Session& s) {
-  finish_step(s);
-  attempt(s, [&] {
+  between_steps(s, [&s] {
     const fs::path file = free_name(file_stem(s.loaded.scene.name), "state");
     save_state(s.loaded.sim(), file);
     say(s, fmt::format("saved {}: open it here, or tetpbd run --from-state {}", file.string(), file.string()));
@@ -151,7 +149,7 @@ void save_scene(Session& s) {
   attempt(s, [&] {
     const Model& model = *s.loaded.sim().model;
     Scene scene = s.loaded.scene;
-    scene.settings = s.loaded.sim().settings;
+    scene.settings = asked_settings(s);
     scene.camera = s.camera;
     if (s.view.follow && s.centre)  // seen from where it starts
       scene.camera->target += glm::vec3(bounds(model.positions).centre()) - *s.centre;
@@ -229,16 +227,16 @@ const Motion* right_now(const Session& s) { return s.loaded.right && !s.loaded.d
 void hold_vertices(Session& s) {
   Loaded& l = s.loaded;
   const bool known = right_now(s) || (l.lanes.size() > 1 && l.comparable);
-  if (!known || l.held == l.sim().steps || (s.view.colour != Colour::motion && !l.probe.reading)) return;
-  if (right_now(s) && !is_kept(*l.right, l.sim().steps)) return;
+  if (!known || l.held == l.lane().steps() || (s.view.colour != Colour::motion && !l.probe.reading)) return;
+  if (right_now(s) && !is_kept(*l.right, l.lane().steps())) return;
   hold_vertices(l.lanes, right_now(s), l.renderer, l.answers);
-  l.held = l.sim().steps;
+  l.held = l.lane().steps();
 }
 
 void follow_shaders(Session& s) {
   const auto version = shader_folder_version();
   if (version == s.loaded.sim().shader_version) return;
-  finish_step(s);
+  if (s.under_way) return between_steps(s, [&s] { follow_shaders(s); });
   const bool done = attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
     if (s.record) write(s, {{"step", s.record->step}, {"shaders", "edited"}});  // no replay knows them

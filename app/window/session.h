@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +21,7 @@
 #include "app/window/preferences.h"
 #include "app/window/probe.h"
 #include "app/window/record.h"
+#include "app/window/step_thread.h"
 #include "app/window/timeline.h"
 #include "render/picking.h"
 #include "render/renderer.h"
@@ -51,6 +54,7 @@ struct Loaded {
   FlattestTet flattest{};  ///< at rest
   std::optional<LiveMap> map{};
   Lane& lane() { return lanes[chosen]; }
+  const Lane& lane() const { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
   const Sim& sim() const { return lanes[chosen].sim; }
 };
@@ -80,7 +84,7 @@ struct Clock {
   int most_steps = 4;              ///< a frame; follows what the GPU can do
   double real = 0, simulated = 0;  ///< s, since the factor was last worked out
   int frames = 0;                  ///< since factor was found
-  double stepping = 0;             ///< s of the last frame that steps in parts took
+  double waited = 0;               ///< s of the last frame, for a step under way
   double factor = 0;               ///< simulated seconds a real one
   double speed() const { return std::ldexp(1.0, -halvings); }
 };
@@ -151,6 +155,12 @@ struct Ui {
 
 inline constexpr double usual_grab_radius = 0.04;
 
+/// What is done once the step under way has ended. An action is also seen in the panel until then.
+struct Waiting {
+  std::function<void()> act;
+  std::optional<Action> action{};
+};
+
 struct Session {
   Capabilities gl;
   EventLog log;
@@ -162,14 +172,17 @@ struct Session {
   float aspect = 1;  ///< of the viewport
   bool playing = true, vsync = true;
   bool take_screenshot = false, filming = false, quit = false;
-  double hints_until = 0;  ///< s, of `now`
-  /// A step of all lanes under way: the lane that is next, and what it took so far.
+  double hints_until = 0;        ///< s, of `now`
+  StepThread* thread = nullptr;  ///< takes the steps that are slow; none: all are taken at once
+  /// A step that the thread takes. Until it has ended, lanes are seen as they were.
   struct UnderWay {
-    std::size_t lane = 0;
-    double seconds = 0, of_lane = 0;
+    std::vector<Lane*> lanes{};
+    std::vector<double> seconds{};  ///< of each
+    bool whole = false;             ///< else somebody gave it up
   };
-  std::optional<UnderWay> under_way{};
-  double step_seconds = 0;  ///< that the last step took where it returns when it is done
+  std::unique_ptr<UnderWay> under_way{};
+  std::deque<Waiting> waiting{};  ///< for its end, in order
+  double step_seconds = 0;        ///< that the last step took, as far as is known
   Clock clock;
   Timeline timeline;
   std::unique_ptr<Record> record{};        ///< if anybody wants it
@@ -271,11 +284,19 @@ void play(Session& session, bool playing);
 void single_step(Session& session);
 /// All lanes; throws what a step throws.
 void step_lanes(Session& session);
-/// Goes on with a step of all lanes, or begins one, for about so many seconds, which ends between two substeps of a GPU
-/// mode; true once it is whole.
-bool step_lanes(Session& session, double seconds);
-/// To be called before anything but drawing touches a lane: ends the step under way.
+/// Lets the thread take the next step, if the session plays and steps are slow.
+void begin_slow_step(Session& session);
+/// Waits for the step under way and does what waits for its end. Throws what the step throws.
 void finish_step(Session& session);
+/// Ends it as soon as may be, because all starts anew.
+void give_up_step(Session& session);
+/// Does it at once, or where a step is under way, when that has ended: nothing else may change a lane or read what a
+/// step changes of it.
+void between_steps(Session& session, std::function<void()> act);
+/// The settings of a lane and the obstacles, as they will be when nothing waits any more.
+const Settings& asked_settings(const Session& session, std::size_t lane);
+const Settings& asked_settings(const Session& session);
+const std::vector<Obstacle>& asked_obstacles(const Session& session);
 /// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& session);
 /// Pauses and says so when the state is found not to be finite.

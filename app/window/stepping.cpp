@@ -17,25 +17,91 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
+constexpr double patience = 0.04;  // s of stepping between two frames
+
 void begin_step(Session& s) {
   if (s.grab) {
     lead(*s.grab);
     perform(s, action::Lead{s.hold->caught(), s.grab->position});
   }
   note_moment(s);
-  s.under_way.emplace();
+}
+
+// Those that step; of several, one that is not finite stands still.
+std::vector<Lane*> stepping_lanes(Session& s) {
+  std::vector<Lane*> lanes;
+  for (Lane& lane : s.loaded.lanes)
+    if (s.loaded.lanes.size() == 1 || !check_finite(lane.sim)) lanes.push_back(&lane);
+  return lanes;
 }
 
 void end_step(Session& s) {
   auto& lanes = s.loaded.lanes;
-  s.step_seconds = s.under_way->seconds;
-  s.under_way.reset();
-  if (s.loaded.right && !s.loaded.disturbed && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
+  if (s.loaded.right && !s.loaded.disturbed && s.loaded.lane().steps() > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
   if (right_now(s)) hold_vertices(s);  // of few steps the reference motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
   keep_moment(s);
   note_step(s);
+}
+
+// In the thread. A timer of the driver would time what is drawn meanwhile.
+void launch(Session& s) {
+  begin_step(s);
+  s.under_way = std::make_unique<Session::UnderWay>();
+  auto& [lanes, seconds, whole] = *s.under_way;
+  lanes = stepping_lanes(s);
+  for (Lane* lane : lanes) lane->sim.timed = false;
+  for (Lane& lane : s.loaded.lanes) keep_shown(lane, s.view);
+  s.thread->start([step = s.under_way.get(), thread = s.thread] {
+    for (Lane* lane : step->lanes) {
+      const auto begin = Steady::now();
+      if (!step_unless(lane->sim, [&] { return thread->is_given_up(); })) return;
+      glFinish();
+      step->seconds.push_back(seconds_since(begin));
+    }
+    step->whole = true;
+  });
+}
+
+// Waits for so many seconds, and says whether no step is under way any more.
+bool land(Session& s, double seconds) {
+  if (!s.under_way) return true;
+  std::exception_ptr thrown;
+  try {
+    if (!s.thread->wait(seconds)) return false;
+  } catch (...) {
+    thrown = std::current_exception();
+  }
+  const auto step = std::move(s.under_way);
+  for (Lane& lane : s.loaded.lanes) lane.shown.reset();
+  if (step->whole) {
+    s.step_seconds = 0;
+    for (std::size_t i = 0; i < step->lanes.size(); ++i) {
+      Lane& lane = *step->lanes[i];
+      s.step_seconds += step->seconds[i];
+      if (s.measuring) lane.step_ms.add(1e3 * step->seconds[i], lane.time());
+      break_attachments(lane.sim);
+    }
+    end_step(s);
+  }
+  while (!s.waiting.empty() && !s.under_way) {
+    const auto act = std::move(s.waiting.front().act);
+    s.waiting.pop_front();
+    attempt(s, act);
+  }
+  if (thrown) std::rethrow_exception(thrown);
+  return !s.under_way;
+}
+
+// Whether a driver queues work: what a step costs is then seen when the frame is late.
+bool is_queued(const Session& s) {
+  return !s.gl.software && std::ranges::none_of(s.loaded.lanes, [](const Lane& l) { return on_cpu(l.sim); });
+}
+
+// A step that takes longer than a frame may, or where it may be, the first.
+bool is_slow(const Session& s) {
+  return s.thread && (s.step_seconds > patience || (s.step_seconds == 0 && !is_queued(s)));
 }
 
 // Energy that nothing supplied is said once.
@@ -51,34 +117,60 @@ void follow_energy(Session& s, Lane& lane, const Measurement& now) {
 
 }  // namespace
 
-bool step_lanes(Session& s, double seconds) {
+void step_lanes(Session& s) {
   const auto begin = Steady::now();
-  if (!s.under_way) begin_step(s);
-  const auto enough = [&] { return seconds_since(begin) > seconds; };
-  for (auto& [number, whole, of_lane] = *s.under_way; number < s.loaded.lanes.size(); ++number, of_lane = 0) {
-    Lane& lane = s.loaded.lanes[number];
-    const bool begins = lane.sim.substeps_done == 0;
-    if (begins && s.loaded.lanes.size() > 1 && check_finite(lane.sim)) continue;
-    const bool in_parts = std::isfinite(seconds);  // a timer of the driver would time what is drawn in between
-    if (in_parts) lane.sim.timed = false;
-    const auto part = Steady::now();
-    const bool ended = step_until(lane.sim, enough);
-    whole += seconds_since(part), of_lane += seconds_since(part);
-    if (!ended) return false;
-    if ((on_cpu(lane.sim) || in_parts) && s.measuring) lane.step_ms.add(of_lane * 1e3, simulated_time(lane.sim));
-    if (number + 1 < s.loaded.lanes.size() && enough()) return ++number, of_lane = 0, false;
+  begin_step(s);
+  for (Lane* lane : stepping_lanes(s)) {
+    const auto own = Steady::now();
+    step(lane->sim);
+    if (on_cpu(lane->sim) && s.measuring) lane->step_ms.add(1e3 * seconds_since(own), lane->time());
   }
+  if (!is_queued(s)) s.step_seconds = seconds_since(begin);
   end_step(s);
-  return true;
 }
 
-void step_lanes(Session& s) {
-  while (!step_lanes(s, std::numeric_limits<double>::infinity())) {
-  }
+void begin_slow_step(Session& s) {
+  if (s.playing && !s.under_way && !s.task && !s.timeline.looping && is_slow(s) &&
+      (s.clock.fast || s.clock.owed >= s.loaded.sim().settings.dt))
+    launch(s);
 }
 
 void finish_step(Session& s) {
-  if (s.under_way) step_lanes(s);
+  while (!land(s, std::numeric_limits<double>::infinity())) {
+  }
+}
+
+void give_up_step(Session& s) {
+  if (s.under_way) s.thread->give_up();
+}
+
+void between_steps(Session& s, std::function<void()> act) {
+  s.under_way ? void(s.waiting.push_back({std::move(act)})) : void(attempt(s, act));
+}
+
+namespace {
+
+// The last of a kind that waits, if it is of this lane.
+template <class Kind>
+const Kind* waiting_action(const Session& s, const auto& counts) {
+  const Kind* found = nullptr;
+  for (const Waiting& w : s.waiting)
+    if (const Kind* own = w.action ? std::get_if<Kind>(&*w.action) : nullptr; own && counts(*own)) found = own;
+  return found;
+}
+
+}  // namespace
+
+const Settings& asked_settings(const Session& s, std::size_t lane) {
+  const auto* set = waiting_action<action::Set>(s, [&](const auto& a) { return a.lane == lane; });
+  return set ? set->settings : s.loaded.lanes[lane].sim.settings;
+}
+
+const Settings& asked_settings(const Session& s) { return asked_settings(s, s.loaded.chosen); }
+
+const std::vector<Obstacle>& asked_obstacles(const Session& s) {
+  const auto* set = waiting_action<action::SetObstacles>(s, [](const auto&) { return true; });
+  return set ? set->obstacles : s.loaded.scene.obstacles;
 }
 
 void log_state(Session& s) {
@@ -87,31 +179,36 @@ void log_state(Session& s) {
     const Sim& sim = s.loaded.lanes[i].sim;
     s.log("lane {} {} {} {:016x}", i + 1, sim.settings.mode, sim.steps, state_hash(sim));
   }
-  s.log("state {} {:016x}", s.loaded.sim().steps, state_hash(s.loaded.sim()));
+  s.log("state {} {:016x}", s.loaded.lane().steps(), state_hash(s.loaded.sim()));
 }
 
 void play(Session& s, bool playing) {
   if (s.playing == playing) return;
-  if (!playing) attempt(s, [&] { finish_step(s); });
   s.playing = playing;
   s.clock.owed = 0;
   s.log("{}", playing ? "play" : "pause");
-  if (!playing) log_state(s);
+  if (!playing) between_steps(s, [&s] { log_state(s); });
 }
 
 void single_step(Session& s) {
   play(s, false);
   s.timeline.looping = false;
-  attempt(s, [&] {
-    step_lanes(s);
-    measure_frame(s, true);
+  between_steps(s, [&s] {
+    attempt(s, [&] {
+      if (is_slow(s)) return launch(s);
+      step_lanes(s);
+      measure_frame(s, true);
+    });
+    between_steps(s, [&s] {
+      s.log("step {}", s.loaded.lane().steps());
+      log_state(s);
+    });
   });
-  s.log("step {}", s.loaded.sim().steps);
-  log_state(s);
 }
 
 void watch_state(Session& s) {
-  if (s.loaded.lanes.size() > 1) return;  // that lane stops, and says so in its picture
+  // Of several, that lane stops, and says so in its picture.
+  if (s.loaded.lanes.size() > 1 || s.under_way) return;
   const auto& found = check_finite(s.loaded.sim());
   if (!found || (!s.playing && std::ranges::any_of(s.messages, &Message::non_finite))) return;
   let_go(s);
@@ -139,7 +236,7 @@ std::optional<Advice> faster_way(const Session& s) {
   const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
   if (!solver_mode(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{fmt::format("mode {}", fast.name), fmt::format("mode={}", fast.name)};
-  if (const Plan& plan = s.loaded.sim().plan; all_materials(own, hard) && plan.iterations * plan.substeps > 5)
+  if (const Plan& plan = s.loaded.lane().plan(); all_materials(own, hard) && plan.iterations * plan.substeps > 5)
     return Advice{"solver hard", "hard,mode=" + own.mode};
   return Advice{"a smaller scene", ""};
 }
@@ -151,37 +248,35 @@ void advance(Session& s, double elapsed) {
   if (clock.real >= 0.5) {
     clock.factor = clock.simulated / clock.real;
     if (s.playing)
-      s.log("running {} {:.3f}x {:.0f} fps", s.loaded.sim().steps, clock.factor, clock.frames / clock.real);
+      s.log("running {} {:.3f}x {:.0f} fps", s.loaded.lane().steps(), clock.factor, clock.frames / clock.real);
     clock.frames = 0;
     clock.real = clock.simulated = 0;
   }
+  // Where drawing needs the cores that step, as long as it took; with a GPU not at all.
+  const double part = is_queued(s) ? 0 : std::clamp(elapsed - clock.waited, 0.015, patience);
+  const auto begin = Steady::now();
+  const double simulated = clock.simulated, dt = s.loaded.sim().settings.dt;
+  if (s.playing) clock.owed += std::min(elapsed, 0.25) * clock.speed();
+  const bool landed = land(s, part);
+  clock.waited = seconds_since(begin);
+  if (clock.simulated != simulated) clock.owed -= dt;
   if (!s.playing) return;
-  const double dt = s.loaded.sim().settings.dt;
-  clock.owed += std::min(elapsed, 0.25) * clock.speed();
-  if (s.timeline.looping) return loop_on(s);
+  if (s.timeline.looping) return landed ? loop_on(s) : void();
   // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
   // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
   // software GL) the time spent here says it all.
-  const bool queued =
-      !s.gl.software && std::ranges::none_of(s.loaded.lanes, [](const Lane& l) { return on_cpu(l.sim); });
-  constexpr double patience = 0.04;  // s of stepping between two frames
-  const auto begin = Steady::now();
+  const bool queued = is_queued(s);
   int taken = 0;
-  // A step that takes longer than a frame may, or that is the first, is taken in parts: the window answers in between.
-  const bool in_parts = s.under_way || (!queued && (s.step_seconds == 0 || s.step_seconds > patience));
-  // As long as drawing takes, so that neither waits for the other for more than half of the time.
-  const double part = std::clamp(elapsed - clock.stepping, 0.015, patience);
-  while ((clock.fast || clock.owed >= dt || s.under_way) && (!queued || taken < clock.most_steps)) {
-    if (!in_parts)
-      step_lanes(s);
-    else if (!step_lanes(s, part))
-      break;
+  while (!is_slow(s) && !s.under_way && (clock.fast || clock.owed >= dt) && (!queued || taken < clock.most_steps)) {
+    step_lanes(s);
     clock.owed -= dt;
     ++taken;
-    if (in_parts || seconds_since(begin) > patience) break;
+    if (seconds_since(begin) > patience) break;
   }
-  clock.stepping = in_parts ? seconds_since(begin) : 0;
-  if (queued && elapsed > 0.066) clock.most_steps = std::max(1, clock.most_steps / 2);
+  if (queued && elapsed > 0.066 && taken > 0) {
+    if (clock.most_steps == 1) s.step_seconds = elapsed;  // one by itself is too slow
+    clock.most_steps = std::max(1, clock.most_steps / 2);
+  }
   if (queued && elapsed < 0.033 && taken == clock.most_steps)
     clock.most_steps = std::min(clock.most_steps * 2, 1 << 14);
   // What could not be simulated in time is dropped: the simulation then runs slower than real time.
@@ -189,8 +284,9 @@ void advance(Session& s, double elapsed) {
 }
 
 void measure_frame(Session& s, bool stepped) {
+  if (s.under_way) return;
   for (Lane& lane : s.loaded.lanes) {
-    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, simulated_time(lane.sim));
+    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, lane.time());
     lane.sim.timed = s.measuring;
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(lane.sim);

@@ -59,7 +59,6 @@ void show(Session& s, std::size_t index) {
 
 void go(Session& s, std::size_t index) {
   if (index >= s.timeline.moments.size()) return;
-  attempt(s, [&] { finish_step(s); });
   let_go(s);
   play(s, false);
   s.timeline.looping = false;
@@ -132,17 +131,20 @@ void show_step(Session& s, long step) {
   go(s, index);
 }
 
-void go_backward(Session& s) { go(s, place_of(s.timeline, steps_of(s.loaded.lanes)) - 1); }
+void go_backward(Session& s) {
+  between_steps(s, [&s] { go(s, place_of(s.timeline, steps_of(s.loaded.lanes)) - 1); });
+}
 
 void go_forward(Session& s) {
-  const std::size_t next = place_of(s.timeline, steps_of(s.loaded.lanes) + 1);
-  next < s.timeline.moments.size() ? go(s, next) : single_step(s);
+  between_steps(s, [&s] {
+    const std::size_t next = place_of(s.timeline, steps_of(s.loaded.lanes) + 1);
+    next < s.timeline.moments.size() ? go(s, next) : single_step(s);
+  });
 }
 
 void loop_on(Session& s) {
   const Timeline& t = s.timeline;
   if (t.moments.size() < 2) return;
-  attempt(s, [&] { finish_step(s); });
   const double dt = s.loaded.sim().settings.dt;
   const std::size_t before = std::min(place_of(t, steps_of(s.loaded.lanes)), t.moments.size() - 1);
   std::size_t index = before;

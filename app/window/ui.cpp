@@ -81,8 +81,8 @@ void draw_status(Session& s, const Rect& place) {
   const std::string rest = fmt::format(
       "{0}  step {1}  {0}  {2:.3f} s  {0}  mode {3}  {0}  {4} tets  {0}  {5} vertices  {0}  {6} constraints  "
       "{0}  {7}",
-      dot, sim.steps, simulated_time(sim), sim.settings.mode, sim.model->rest.tets.size(), sim.model->positions.size(),
-      sim.system.count(), s.gl.renderer);
+      dot, s.loaded.lane().steps(), s.loaded.lane().time(), sim.settings.mode, sim.model->rest.tets.size(),
+      sim.model->positions.size(), sim.system.count(), s.gl.renderer);
   ImGui::TextUnformatted(rest.c_str());
   ImGui::PopClipRect();
   ImGui::SameLine(place.width - right);
@@ -265,8 +265,8 @@ void draw_pull(const Session& s, const Rect& view) {
 // The outline of the chosen obstacle, and arrows along which it can be dragged.
 void draw_gizmo(Session& s, const Rect& view) {
   const Rect place = lane_place(s, s.loaded.chosen, view);
-  const Obstacle& o = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
-  const Pose pose = pose_at(o, simulated_time(s.loaded.sim()));
+  const Obstacle& o = asked_obstacles(s)[std::size_t(s.obstacle)];
+  const Pose pose = pose_at(o, s.loaded.lane().time());
   ImDrawList& draw = *ImGui::GetBackgroundDrawList();
   draw.PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
   const auto line = [&](const glm::dvec3& a, const glm::dvec3& b, ImU32 colour, float width) {

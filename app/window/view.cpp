@@ -37,7 +37,7 @@ void next_cut(Session& s) {
 }
 
 Frame shown_frame(const Session& s, std::size_t lane) {
-  Frame frame = make_frame(s.loaded.lanes[lane].sim, s.camera, s.view, {});
+  Frame frame = frame_of(s.loaded.lanes[lane], s.camera, s.view, {});
   frame.viewport = {};
   frame.options.follow = false;
   return frame;
@@ -55,7 +55,7 @@ void draw_lanes(Session& s, const Target& target) {
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
   const bool flattest = s.view.flattest || std::exchange(s.ui.at_flattest, false);
   for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Frame frame = make_frame(lanes[i].sim, s.camera, s.view, target);
+    Frame frame = frame_of(lanes[i], s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
     // The hand's are larger than those of the scene.
     for (const std::uint32_t v : s.timeline.touched)
@@ -89,7 +89,7 @@ void draw_lanes(Session& s, const Target& target) {
     if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
     draw(s.loaded.renderer, frame);
     if (!several || s.overlaid || !s.ghost || i == right) continue;
-    frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
+    frame.positions = lanes[right].positions().id(), frame.velocities = lanes[right].velocities().id();
     frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
     frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear(), frame.tet.reset();
     frame.options.arrows = frame.options.contacts = false;
@@ -101,9 +101,8 @@ void draw_lanes(Session& s, const Target& target) {
 
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
 void frame_body(Session& s) {
-  const Sim& sim = s.loaded.sim();
-  const Bounds bodies = bounds(read_state(sim).positions);
-  const Bounds box = with_obstacles(bodies, *sim.model, simulated_time(sim), bodies.size());
+  const Bounds bodies = bounds(positions_of(s.loaded.lane()));
+  const Bounds box = with_obstacles(bodies, *s.loaded.model, s.loaded.lane().time(), bodies.size());
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
   note(s, action::SetCamera{s.camera});

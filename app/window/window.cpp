@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <string_view>
 #include <tuple>
@@ -243,7 +244,8 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   draw_ui(s, layout);
   if (s.task) draw_busy(s, layout, s.task->name);
   end_imgui_frame(d, view.target);
-  if (named) attempt(s, std::exchange(s.task, std::nullopt)->act);  // its name has been on the screen
+  // Its name has been on the screen.
+  if (named && !s.under_way) attempt(s, std::exchange(s.task, std::nullopt)->act);
 }
 
 // What a task that lasts shows of itself, some ten times a second; only its own window listens.
@@ -263,6 +265,18 @@ void show_progress(Session& s, View& view, Input& input, Desktop& d, const std::
   if (cancelled || escaped || glfwWindowShouldClose(d.window) || interrupted()) throw Interrupted();
 }
 
+// Whatever ends the window, the thread has to leave the lanes first.
+struct Leave {
+  Session& session;
+  ~Leave() {
+    give_up_step(session);
+    try {
+      if (session.under_way) session.thread->wait(std::numeric_limits<double>::infinity());
+    } catch (const std::exception&) {  // nobody is left to be told
+    }
+  }
+};
+
 }  // namespace
 
 int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides,
@@ -273,8 +287,12 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   const bool as_before = options.size == usual_options.size && before_now.width > 0;
   Desktop desktop(as_before ? before_now.width : options.size[0], as_before ? before_now.height : options.size[1],
                   "tetpbd");
+  const Capabilities gl = load_gl();
+  StepThread thread(desktop.window, gl.software);
   Session s;  // after the desktop: its GL objects go before the context does
-  s.gl = load_gl();
+  const Leave leave{s};
+  s.gl = gl;
+  s.thread = &thread;
   count_gl_errors(print_gl_error);
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   Preferences written = s.ui.kept = before_now;
@@ -322,8 +340,8 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   if (s.hints_until > 0) s.hints_until += before;
   while (!glfwWindowShouldClose(desktop.window) && !s.quit && !interrupted()) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task && !s.filming &&
-                      view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
+    const bool idle = !s.playing && !s.under_way && !is_filling(s) && !moving && !input.busy() && !s.task &&
+                      !s.filming && view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
     if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
     else
@@ -350,6 +368,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
           measure_frame(s, s.clock.simulated != simulated);
         }))
       s.ui.plots = false, play(s, false);  // said once, not every frame
+    attempt(s, [&] { begin_slow_step(s); });
     fill_map(s);
     moving = follow_bodies(s, elapsed);
     if (s.now - last_check > 0.5) {
@@ -360,9 +379,14 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     draw_frame(s, view, input, desktop);
   }
   end_film(s, view);
+  s.waiting.clear();
+  if (s.record) attempt(s, [&] { finish_step(s); });  // its last line tells the state
   end_record(s);
   keep();
   s.log("closed");
+  give_up_step(s);
+  constexpr double most = 0.3;                                // s that a window which has been closed may stay
+  if (s.under_way && !thread.wait(most)) std::quick_exit(0);  // nothing is left to be written
   return 0;
 }
 

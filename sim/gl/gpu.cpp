@@ -31,7 +31,7 @@ GLuint new_buffer() {
 
 // Bytes available for another buffer beside `held` bytes of others, where the driver says it.
 std::optional<std::int64_t> available_bytes(std::int64_t held) {
-  if (const std::int64_t most = gl_live().most_bytes) return most - held;
+  if (const std::int64_t most = gl_counts().most_bytes) return most - held;
   GLint kib[4] = {};
   if (GLEW_ATI_meminfo) {
     glGetIntegerv(GL_VBO_FREE_MEMORY_ATI, kib);
@@ -48,7 +48,7 @@ std::optional<std::int64_t> available_bytes(std::int64_t held) {
 constexpr std::size_t large = 1 << 20;
 
 void check_available(const std::string& label, std::size_t bytes) {
-  if (bytes < large && gl_live().most_bytes == 0) return;
+  if (bytes < large && gl_counts().most_bytes == 0) return;
   const std::int64_t held = gl_live().buffer_bytes - std::int64_t(bytes);
   const auto available = available_bytes(held);
   if (available && std::int64_t(bytes) > *available)

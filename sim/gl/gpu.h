@@ -6,10 +6,12 @@
 #include <GL/glew.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <glm/glm.hpp>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,16 +21,46 @@
 
 namespace tetpbd {
 
-/// What the program has of GL at present, in all contexts together; images' bytes are not counted.
-struct GlLive {
-  long objects = 0;
-  std::int64_t buffer_bytes = 0;
-  std::int64_t most_bytes = 0;  ///< in tests, a limit for all buffers together; 0: the GPU's own
+/// What the program has of GL at present, in all contexts and threads together; images' bytes are not counted.
+struct GlCounts {
+  std::atomic<long> objects = 0;
+  std::atomic<std::int64_t> buffer_bytes = 0;
+  std::atomic<std::int64_t> most_bytes = 0;  ///< in tests, a limit for all buffers together; 0: the GPU's own
 };
-inline GlLive& gl_live() {
-  static GlLive live;
-  return live;
+inline GlCounts& gl_counts() {
+  static GlCounts counts;
+  return counts;
 }
+struct GlLive {
+  long objects = gl_counts().objects;
+  std::int64_t buffer_bytes = gl_counts().buffer_bytes;
+};
+inline GlLive gl_live() { return {}; }
+
+/// A lock that goes to who has waited longest.
+class Turn {
+ public:
+  void lock() {
+    const std::lock_guard in_line(line_);
+    held_.lock();
+  }
+  void unlock() { held_.unlock(); }
+
+ private:
+  std::mutex line_, held_;
+};
+/// For a thread that must not call GL while another does, because the driver cannot take that: held while it may. None:
+/// any time will do.
+inline thread_local Turn* gl_turn = nullptr;
+/// Lets another thread that waits for its turn have it.
+inline void give_turn() {
+  if (gl_turn) gl_turn->unlock(), gl_turn->lock();
+}
+/// Work without GL, during which others may call it.
+struct WithoutGl {
+  WithoutGl() { gl_turn ? gl_turn->unlock() : void(); }
+  ~WithoutGl() { gl_turn ? gl_turn->lock() : void(); }
+};
 
 inline void label_object(GLenum kind, GLuint id, const std::string& label) {
   glObjectLabel(kind, id, GLsizei(label.size()), label.data());
@@ -51,8 +83,8 @@ class Owned {
 
  private:
   void count(int change) const {
-    gl_live().objects += change;
-    gl_live().buffer_bytes += change * bytes_;
+    gl_counts().objects += change;
+    gl_counts().buffer_bytes += change * bytes_;
   }
   void swap(Owned& other) { std::swap(name_, other.name_), std::swap(bytes_, other.bytes_); }
   Name name_{};

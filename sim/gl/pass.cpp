@@ -48,6 +48,7 @@ DispatchCount& Recorder::count(const Pass& pass, const char* what, std::size_t b
 
 void Recorder::run(Pass& pass, std::initializer_list<DispatchParameter> parameters, const char* what,
                    std::size_t bytes) {
+  give_turn();
   const std::vector<std::string>& blocks = pass.program.storage_blocks();
   if (pass.recorder != this) {
     pass.recorder = this, pass.places.clear();

@@ -8,7 +8,7 @@ begin_inside "$@"
 
 cat >slow.json <<'JSON'
 {"name": "slow", "bodies": [{"name": "block", "block": {"size": [2, 1, 1], "cells": [24, 12, 12]}, "position": [0, 0.2, 0]}],
- "solver": {"mode": "node", "substeps": 300, "iterations": 1, "material": "neo-hookean"}}
+ "solver": {"mode": "node", "substeps": 150, "iterations": 1, "material": "neo-hookean"}}
 JSON
 open_window --scene slow.json --size 900x650
 await '^running [0-9]+ ' 6
@@ -30,11 +30,30 @@ done
 forget
 for k in $(seq 20); do xdotool mousemove $(point "section World" 0.5 0.5) mousedown 1 mouseup 1; done
 await '^(opened|folded) World' 20
-# Steps in parts give the same bits.
+# A step beside the window gives the same bits.
 key r; await '^reset'; await '^running 2 '; key space; await '^pause'; await '^state '
 read -r _ steps hash < <(grep '^state ' "$log" | tail -n 1)
 omega=$(grep '^set omega' "$log" | tail -n 1 | cut -d' ' -f3)
 "$program" run --scene slow.json --omega "$omega" --steps "$steps" --csv-every 0 --out headless >/dev/null 2>&1
-grep -q "\"state_hash\": \"$hash\"" headless/stats.json || fail "steps in parts have another state than a run without a window"
+grep -q "\"state_hash\": \"$hash\"" headless/stats.json || fail "slow steps have another state than a run without a window"
+# What is asked for during a step happens in order once that has ended: a lane, a setting of it, and back to one.
+key space; await '^running 3 '
+key k; key j; await '^lane .*' 3
+await '^running [1-9]'
 close_window
+
+# A step that cannot be divided does not hold up the window either, nor its end.
+open_window --scene slow.json --mode cpu --substeps 1000 --size 900x650
+await '^running [0-9]+ ' 6
+frames=$(new_events | awk '/^running/ {n[$2] += $4 / 2} END {for (k in n) if (n[k] > m) m = n[k]; print int(m)}')
+[[ $frames -ge 4 ]] || fail "only $frames frames were drawn in a step on the CPU"
+forget; await '^running' 2
+step=$(new_events | awk '/^running/ {s = $2} END {print s}')
+drag 3 $cx $cy 60 0; release 3; await '^camera'
+[[ $(tac "$log" | awk '/^running/ {print $2; exit}') -le $((step + 1)) ]] || fail "steps passed until the camera turned"
+began=$(date +%s.%N); close_window; ended=$(date +%s.%N)
+step=$("$program" run --scene slow.json --mode cpu --substeps 1000 --steps 1 --csv-every 0 --out on_cpu 2>&1 |
+  sed -nE 's/.* ([0-9.]+) ms a step.*/\1/p')
+awk -v closing="$(bc <<<"$ended - $began")" -v step="$step" 'BEGIN {exit !(2000 * closing < step)}' ||
+  fail "closing took $(bc <<<"$ended - $began") s of a step of $step ms"
 exit 0

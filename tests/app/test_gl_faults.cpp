@@ -353,7 +353,7 @@ TEST_CASE("memory that a GPU does not have is refused before a run, with what is
   Sim running = create_sim(model, quick("node"));
   step(running);
   struct AsBefore {
-    ~AsBefore() { gl_live().most_bytes = 0; }
+    ~AsBefore() { gl_counts().most_bytes = 0; }
   } as_before;
   for (const SolverMode& mode : solver_modes()) {
     CAPTURE(mode.name);
@@ -364,7 +364,7 @@ TEST_CASE("memory that a GPU does not have is refused before a run, with what is
       needed = gl_live().buffer_bytes - before.buffer_bytes;
     }
     for (int part = 0; part < 20; ++part) {
-      gl_live().most_bytes = before.buffer_bytes + needed * part / 20 + 1;
+      gl_counts().most_bytes = before.buffer_bytes + needed * part / 20 + 1;
       const std::string what = what_of([&] { create_sim(model, mode_named(mode.name)); });
       CAPTURE(what);
       CHECK(has(what, "out of GPU memory: buffer '"));
@@ -378,7 +378,7 @@ TEST_CASE("memory that a GPU does not have is refused before a run, with what is
       CHECK(running.settings.mode == "node");
       CHECK(state_hash(running) == hash);
     }
-    gl_live().most_bytes = 0;
+    gl_counts().most_bytes = 0;
     step(running);
     CHECK(!check_finite(running, true));
   }

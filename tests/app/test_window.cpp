@@ -124,6 +124,7 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   for (const char* none : {"budget_ms=", "budget_ms=-1", "budget_ms=2ms", "budget_ms=inf"})
     CHECK_THROWS_WITH_AS(lane_settings(own, none, "--lane"), doctest::Contains("is no time"), Error);
   CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no solver"), Error);
+  CHECK(lane_settings(own, "gauss-seidel", "--lane") == lane_settings(own, "mode=gauss-seidel", "--lane"));
   CHECK_THROWS_WITH_AS(lane_settings(own, "mode=newton", "--lane"), doctest::Contains("needs forces"), Error);
   for (const Comparison& row : comparisons()) {
     CAPTURE(row.name);
@@ -139,7 +140,7 @@ TEST_CASE("window: lanes step together from a common start, and are held against
   Session s;
   show_beam(s);
   single_step(s);
-  compare_lanes(s, {"paper,substeps=1,iterations=1", "hard", "cpu-fast"});
+  compare_lanes(s, {"paper,substeps=1,iterations=1", "hard", "fastest"});
   CHECK(s.messages.size() == 1);  // no such word: nothing changed
   CHECK(s.loaded.lanes.size() == 1);
   CHECK(s.loaded.sim().steps == 1);

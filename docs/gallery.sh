@@ -11,7 +11,7 @@ mkdir -p "$folder"
 page=$folder/README.md
 printf '# Gallery\n\nEach picture is the last frame of the command below it, with `--png-every`. Made by `docs/gallery.sh`.\n' >"$page"
 
-clips=' bunny bowl funnel press rollers spikes gripper balloon sewn-bag twisted-beams ring squishy-balls cards chain '
+clips=' bunny bowl funnel press rollers spikes gripper balloon sewn-bag twisted-beams bowl-32 ring squishy-balls cards chain '
 show() {  # NAME STEPS TEXT OPTIONS...
   printf '\n## %s\n\n![%s](%s.jpg)\n\n```\ntetpbd run' "$3" "$3" "$1" >>"$page"
   for word in "${@:4}" --steps "$2"; do
@@ -87,7 +87,8 @@ show ring 80 'Balls of jelly, thrown at each other' --scene ring "${view[@]}"
 look_at 0,0.4,0 2.7
 show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene squishy-balls "${view[@]}"
 show twisted-beams 340 'Beams are twisted and pressed against each other' --scene twisted-beams
-show bowl-32 160 'Bunnies of jelly fall into a bowl: 346 000 tets (minutes per step without a GPU)' --scene bowl-32
+look_at 0,1,0 5.4 '' 26
+show bowl-32 132 'Bunnies of jelly fall into a bowl: 346 000 tets (minutes per step without a GPU)' --scene bowl-32 "${view[@]}"
 look_at 0.1,0.68,0 1.7
 show folded-ears 240 'A roller bends the ears of a bunny onto its face' --scene folded-ears "${view[@]}"
 show layers 60 'Four cloths fall over a ball' --scene layers

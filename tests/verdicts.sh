@@ -12,7 +12,7 @@ scenes=("$@")
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 
-number() { sed -nE "s/^ *\"$1\": ([-0-9.e+]+|null),?\$/\1/p" "$out/stats.json" | head -n 1; }
+number() { sed -nE "s/^ *\"$1\": ([-0-9.e+]+|null),?\$/\1/p" "$out/stats.json" | tail -n 1; }  # after those by body
 row() {  # SCENE MODE
   local verdict
   rm -f "$out"/*

@@ -16,7 +16,7 @@ StepThread::StepThread(GLFWwindow* window, bool turns) : turns_(turns) {
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
   context_ = glfwCreateWindow(1, 1, "tetpbd steps", nullptr, window);
   glfwWindowHint(GLFW_VISIBLE, GLFW_TRUE);
-  if (!context_) throw Error("no second OpenGL context", "for steps", "use a newer driver, or tetpbd run", 1);
+  if (!context_) throw Error("no second OpenGL context", "slow steps will stop the window", "use a newer driver", 1);
   for (Pass& idle : idle_) idle = {Program::compute("idle.comp"), 1};
   if (turns_) turn_.lock();
   thread_ = std::thread([this] { run(); });

@@ -15,6 +15,7 @@
 
 #include "app/commands.h"
 #include "app/files.h"
+#include "app/lab/progress.h"
 #include "app/window/input.h"
 #include "app/window/session.h"
 #include "app/window/ui.h"
@@ -265,6 +266,16 @@ void show_progress(Session& s, View& view, Input& input, Desktop& d, const std::
   if (cancelled || escaped || glfwWindowShouldClose(d.window) || interrupted()) throw Interrupted();
 }
 
+// Where the driver has no second context, slow steps stop the window.
+std::unique_ptr<StepThread> make_thread(GLFWwindow* window, const Capabilities& gl) {
+  try {
+    return std::make_unique<StepThread>(window, gl.software);
+  } catch (const Error& error) {
+    print_error(fmt::format("tetpbd: {}\n", error.what()));
+    return nullptr;
+  }
+}
+
 // Whatever ends the window, the thread has to leave the lanes first.
 struct Leave {
   Session& session;
@@ -288,11 +299,11 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   Desktop desktop(as_before ? before_now.width : options.size[0], as_before ? before_now.height : options.size[1],
                   "tetpbd");
   const Capabilities gl = load_gl();
-  StepThread thread(desktop.window, gl.software);
+  std::unique_ptr<StepThread> thread = make_thread(desktop.window, gl);
   Session s;  // after the desktop: its GL objects go before the context does
   const Leave leave{s};
   s.gl = gl;
-  s.thread = &thread;
+  s.thread = thread.get();
   count_gl_errors(print_gl_error);
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   Preferences written = s.ui.kept = before_now;
@@ -386,7 +397,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.log("closed");
   give_up_step(s);
   constexpr double most = 0.3;                                // s that a window which has been closed may stay
-  if (s.under_way && !thread.wait(most)) std::quick_exit(0);  // nothing is left to be written
+  if (s.under_way && !thread->wait(most)) std::quick_exit(0);  // nothing is left to be written
   return 0;
 }
 

@@ -376,7 +376,7 @@ void draw_timeline(Session& s) {
                         std::max(t.moments.back()->time, s.loaded.lane().time()));
   if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
                           ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
-    show_step(s, now);
+    between_steps(s, [&s, now] { show_step(s, now); });
   describe_item(s, "time",
                 fmt::format("move all lanes in time; playing from here discards later states\nLeft and Right: state by "
                             "state\n{} states are stored, {:.3g} of {} MB: all recent ones, fewer of the older\n"

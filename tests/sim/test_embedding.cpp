@@ -1,9 +1,14 @@
 // A simulation in a GL context that others use as well.
 #include <doctest/doctest.h>
+#define EGL_NO_X11
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
 
+#include <cstring>
 #include <functional>
 #include <map>
 #include <string>
+#include <thread>
 
 #include "sim/measure/metrics.h"
 #include "sim/snapshot.h"
@@ -131,6 +136,80 @@ TEST_CASE_FIXTURE(GlTest, "a call leaves what its caller has bound as it was") {
     write_state(sim, read_state(sim));
     reset(sim);
     unchanged(mode, "write_state, reset");
+  }
+}
+
+namespace {
+
+// Of a thread of its own, with the objects of the context that is current when it is made.
+class SharedContext {
+ public:
+  SharedContext() {
+    for (const EGLint reset : {EGL_LOSE_CONTEXT_ON_RESET, EGL_NO_RESET_NOTIFICATION}) {
+      const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                   4,
+                                   EGL_CONTEXT_MINOR_VERSION,
+                                   3,
+                                   EGL_CONTEXT_OPENGL_DEBUG,
+                                   EGL_TRUE,
+                                   EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
+                                   reset,
+                                   EGL_NONE};
+      if (!context_) context_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, eglGetCurrentContext(), attributes);
+    }
+  }
+  ~SharedContext() { eglDestroyContext(display_, context_); }
+  SharedContext(const SharedContext&) = delete;
+  SharedContext& operator=(const SharedContext&) = delete;
+  explicit operator bool() const { return context_ != EGL_NO_CONTEXT; }
+  void run(const std::function<void()>& work) const {
+    eglBindAPI(EGL_OPENGL_API);
+    REQUIRE(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_));
+    work();
+    glFinish();
+    eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  }
+
+ private:
+  EGLDisplay display_ = eglGetCurrentDisplay();
+  EGLContext context_ = EGL_NO_CONTEXT;
+};
+
+}  // namespace
+
+TEST_CASE_FIXTURE(GlTest, "a step in another context that shares objects gives the same bits") {
+  const auto model = scene();
+  for (const std::string mode : {"node", "explicit", "newton", "cpu-fast"}) {
+    CAPTURE(mode);
+    Settings settings;
+    set_mode(settings, mode, "test");
+    const SolverMode& row = solver_mode(settings);
+    if (row.pairs) settings.contact = "bodies";
+    if (row.forces) settings.material = "neo-hookean";
+    const SharedContext other;
+    REQUIRE(other);
+    Sim alone = create_sim(model, settings), handed = create_sim(model, settings);
+    const Buffer shown("shown", handed.positions.bytes());
+    for (int s = 0; s < 12; ++s) {
+      step(alone);
+      handed.positions.copy_to(shown, 0, 0, shown.bytes());
+      const auto before = shown.read_all<float>();
+      const Fence queued = Fence::here();
+      glFlush();
+      std::thread thread([&] {
+        other.run([&] {
+          glWaitSync(queued.sync(), 0, GL_TIMEOUT_IGNORED);
+          step(handed);
+        });
+      });
+      // Mesa's llvmpipe cannot take what two threads do at once.
+      for (int k = 0; k < 20 && !is_software_renderer(); ++k) {
+        const auto now = shown.read_all<float>();
+        CHECK(std::memcmp(now.data(), before.data(), shown.bytes()) == 0);
+      }
+      thread.join();
+    }
+    CHECK(state_hash(handed) == state_hash(alone));
   }
 }
 

@@ -59,14 +59,14 @@ bool StepThread::wait(double seconds) {
   return done;
 }
 
-// In a flush Mesa lets go of kernels that another context deleted. It then takes the last one in use for bound, which
-// it no longer is, and crashes if that is dispatched next (seen in 22.3). So the last before a flush is one that is
-// not.
-void StepThread::flush() {
+// Mesa (seen in 22.3) crashes where one context deletes a kernel that another has used last: that one keeps the kernel
+// until it uses the next, and what it then lets go of unbinds, in the first context's next flush, whatever kernel that
+// has used last, which is not bound anew if it is dispatched again. So the last kernel before and after work is none of
+// the window's, and never the same twice.
+void StepThread::rest() {
   recorder_.begin();
   recorder_.run(idle_[next_idle_]);
   next_idle_ = 1 - next_idle_;
-  glFlush();
 }
 
 void StepThread::run() {
@@ -82,14 +82,21 @@ void StepThread::run() {
     lock.unlock();
     if (turns_) turn_.lock();
     std::exception_ptr thrown;
-    try {
-      flush();
+    const auto keep_thrown = [&](const auto& act) {
+      try {
+        act();
+      } catch (...) {
+        if (!thrown) thrown = std::current_exception();
+      }
+    };
+    keep_thrown([&] {
+      rest();
+      glFlush();
       glWaitSync(queued.sync(), 0, GL_TIMEOUT_IGNORED);
       work_();
-      glFinish();  // what another context shows must be there
-    } catch (...) {
-      thrown = std::current_exception();
-    }
+    });
+    keep_thrown([&] { rest(); });
+    glFinish();  // what another context shows must be there
     queued = {};
     if (turns_) turn_.unlock();
     lock.lock();

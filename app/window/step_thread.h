@@ -34,7 +34,7 @@ class StepThread {
 
  private:
   void run();
-  void flush();
+  void rest();
   GLFWwindow* context_ = nullptr;
   std::mutex mutex_;
   std::condition_variable changed_;

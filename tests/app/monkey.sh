@@ -25,6 +25,9 @@ scene held '{"name": "a", "block": {"size": [2, 0.5, 0.5], "cells": [6, 2, 2]}, 
 scene two '{"name": "a", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 0, 0]},
   {"name": "b", "block": {"size": [0.5, 1, 0.5], "cells": [1, 3, 1]}, "position": [1.5, 0.5, 0], "deform": "random"}' \
   ', "world": {"obstacles": [{"point": [0, 0, -1], "normal": [0, 0, 1]}]}'
+# Its steps take longer than a frame may, so that the thread takes them.
+echo '{"name": "slow", "bodies": [{"name": "a", "block": {"size": [1, 1, 1], "cells": [8, 8, 8]}, "position": [0, 0.2, 0]}],
+  "solver": {"mode": "node", "material": "neo-hookean", "substeps": 100, "dt": 0.01}}' >models/scenes/slow.json
 cat >cube.off <<'END'
 OFF
 8 12 0

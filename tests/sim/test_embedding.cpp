@@ -186,10 +186,10 @@ TEST_CASE_FIXTURE(GlTest, "a step in another context that shares objects gives t
     const SolverMode& row = solver_mode(settings);
     if (row.pairs) settings.contact = "bodies";
     if (row.forces) settings.material = "neo-hookean";
-    const SharedContext other;
-    REQUIRE(other);
     Sim alone = create_sim(model, settings), handed = create_sim(model, settings);
     const Buffer shown("shown", handed.positions.bytes());
+    const SharedContext other;  // goes before what it uses
+    REQUIRE(other);
     for (int s = 0; s < 12; ++s) {
       step(alone);
       handed.positions.copy_to(shown, 0, 0, shown.bytes());

@@ -182,8 +182,8 @@ bool take_obstacle(Input& in, const Pick& pick) {
   return true;
 }
 
-// Pins what a double click met, or catches it if the button is still down.
-void take_vertex(Input& in, const Pick& pick, bool pinning) {
+// After a double click it is pinned; while the button is still down, caught.
+void pin_or_catch(Input& in, const Pick& pick, bool pinning) {
   Session& s = in.session;
   if (pinning) return toggle_pin(s, pick.vertex);
   if (in.drag != Drag::asking) return;
@@ -197,7 +197,7 @@ void take_answer(Input& in) {
   if (!pick) return;
   const bool pinning = std::exchange(in.pinning, false);
   if (take_obstacle(in, *pick)) return;
-  between_steps(s, [&in, pick = *pick, pinning] { take_vertex(in, pick, pinning); });
+  between_steps(s, [&in, pick = *pick, pinning] { pin_or_catch(in, pick, pinning); });
 }
 
 // Asks what is under a cursor that has come to rest, and again when the picture there may have changed.

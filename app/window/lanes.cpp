@@ -46,20 +46,13 @@ void keep_shown(Lane& lane, const ViewOptions& view) {
   lane.shown->frame.positions = lane.shown_positions.id(), lane.shown->frame.velocities = lane.shown_velocities.id();
 }
 
-Frame frame_of(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target) {
+Frame make_frame(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target) {
   if (!lane.shown) return make_frame(lane.sim, camera, view, target);
   Frame frame = lane.shown->frame;
   frame.camera = camera, frame.options = view;
   frame.viewport = {0, 0, target.width, target.height};
   frame.target = target.framebuffer.id();
   return frame;
-}
-
-std::vector<glm::dvec3> positions_of(const Lane& lane) {
-  std::vector<glm::dvec3> positions;
-  for (const Position& p : lane.positions().read_all<Position>())
-    positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  return positions;
 }
 
 std::string describe(const Lane& lane, bool material) {

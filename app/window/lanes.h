@@ -64,10 +64,8 @@ struct Lane {
 
 /// Before the thread steps it: keeps what is seen of it. `view`: what the picture shows.
 void keep_shown(Lane& lane, const ViewOptions& view);
-/// A picture of it, as make_frame() makes of a simulation.
-Frame frame_of(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target);
-/// m, by vertex, as seen. Waits for the GPU.
-std::vector<glm::dvec3> positions_of(const Lane& lane);
+/// A picture of what is seen of it.
+Frame make_frame(const Lane& lane, const Camera& camera, const ViewOptions& view, const Target& target);
 
 /// Lanes of one key have one reference motion. Reads the whole mesh.
 std::uint64_t motion_key(const Lane& lane);

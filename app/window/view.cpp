@@ -37,7 +37,7 @@ void next_cut(Session& s) {
 }
 
 Frame shown_frame(const Session& s, std::size_t lane) {
-  Frame frame = frame_of(s.loaded.lanes[lane], s.camera, s.view, {});
+  Frame frame = make_frame(s.loaded.lanes[lane], s.camera, s.view, {});
   frame.viewport = {};
   frame.options.follow = false;
   return frame;
@@ -55,7 +55,7 @@ void draw_lanes(Session& s, const Target& target) {
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
   const bool flattest = s.view.flattest || std::exchange(s.ui.at_flattest, false);
   for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Frame frame = frame_of(lanes[i], s.camera, s.view, target);
+    Frame frame = make_frame(lanes[i], s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
     // The hand's are larger than those of the scene.
     for (const std::uint32_t v : s.timeline.touched)
@@ -101,8 +101,9 @@ void draw_lanes(Session& s, const Target& target) {
 
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
 void frame_body(Session& s) {
-  const Bounds bodies = bounds(positions_of(s.loaded.lane()));
-  const Bounds box = with_obstacles(bodies, *s.loaded.model, s.loaded.lane().time(), bodies.size());
+  const Lane& lane = s.loaded.lane();
+  const Bounds bodies = bounds(make_state(lane.positions().read_all<Position>(), {}).positions);
+  const Bounds box = with_obstacles(bodies, *s.loaded.model, lane.time(), bodies.size());
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
   note(s, action::SetCamera{s.camera});

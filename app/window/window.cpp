@@ -396,7 +396,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   keep();
   s.log("closed");
   give_up_step(s);
-  constexpr double most = 0.3;                                // s that a window which has been closed may stay
+  constexpr double most = 0.3;                                 // s that a window which has been closed may stay
   if (s.under_way && !thread->wait(most)) std::quick_exit(0);  // nothing is left to be written
   return 0;
 }
